@@ -1,0 +1,31 @@
+// Whole files: read, written atomically, hashed. Paths are UTF-8 bytes as the caller gave them.
+#pragma once
+#include "base/error.h"
+#include "base/text.h"
+#include <stddef.h>
+
+enum { ALB_PATH_SIZE = 4096, ALB_HASH_SIZE = 65 };
+
+bool alb_file_exists(const char *path);
+bool alb_file_is_directory(const char *path);
+// Reads the whole file; *bytes is NUL-terminated one past *size and owned by the caller (free). Refuses files over 2 GiB.
+bool alb_file_read(char **bytes, size_t *size, const char *path, alb_error *error);
+// Writes to a temporary name beside `path` and renames: `path` holds the old bytes or the new ones, never a part.
+bool alb_file_write(const char *path, const void *bytes, size_t size, alb_error *error);
+// The same for a text; refuses a text that ran out of memory. The text stays the caller's.
+bool alb_file_write_text(const char *path, const alb_text *text, alb_error *error);
+// For libraries that write a file themselves: choose the temporary name, then commit (rename) or abandon (remove) it.
+// An interrupt (SIGINT, SIGTERM) removes the temporary file that is open at that moment.
+bool alb_file_begin(char temporary[ALB_PATH_SIZE], const char *path, alb_error *error);
+bool alb_file_commit(const char *temporary, const char *path, alb_error *error);
+void alb_file_abandon(const char *temporary);
+// Makes the directory and its parents; an existing one is fine.
+bool alb_file_make_directory(const char *path, alb_error *error);
+// "a/b" from "a" and "b"; b alone when it is absolute or a is empty.
+bool alb_path_join(char out[ALB_PATH_SIZE], const char *a, const char *b, alb_error *error);
+// The folder of a path ("." where it has none) and its last component (borrowed from path).
+bool alb_path_folder(char out[ALB_PATH_SIZE], const char *path, alb_error *error);
+const char *alb_path_name(const char *path);
+// SHA-256 as 64 hexadecimal digits.
+bool alb_hash_bytes(char hex[ALB_HASH_SIZE], const void *bytes, size_t size, alb_error *error);
+bool alb_hash_file(char hex[ALB_HASH_SIZE], const char *path, alb_error *error);

@@ -1,0 +1,57 @@
+// A material: what fit leaves behind and render reads (material.json). Per channel and side a radially symmetric profile
+// S(r): radiant exitance at distance r per unit incident flux, 1/mm^2.
+#pragma once
+#include "base/error.h"
+#include "capture/session.h" // alb_side
+
+enum { ALB_PARAMETERS_MAX = 6 };
+
+typedef enum alb_form {
+    ALB_FORM_NONE,
+    ALB_FORM_EXPONENTIAL,         // a1 e^(-b1 r)
+    ALB_FORM_TWO_EXPONENTIALS,    // a1 e^(-b1 r) + a2 e^(-b2 r), a > 0 (Sheng et al. 2014, sec. 6)
+    ALB_FORM_SIGNED_EXPONENTIALS, // the same with b1 < b2, a2 < 0, a1 + a2 >= 0: S >= 0 everywhere
+    ALB_FORM_DIPOLE,              // classic dipole of a half-space (Jensen et al. 2001)
+    ALB_FORMS
+} alb_form;
+
+// Parameters of the exponential forms: a1, b1, a2, b2 (amplitude_per_mm2, decay_per_mm).
+// Of the dipole: absorption_per_mm, reduced_scattering_per_mm, refractive_index.
+typedef struct alb_profile {
+    alb_form form;
+    double parameters[ALB_PARAMETERS_MAX];
+} alb_profile;
+
+int alb_form_parameter_count(alb_form form);
+const char *alb_form_name(alb_form form);            // "two_exponentials"
+const char *alb_form_parameter_name(alb_form form, int i); // "amplitude_1_per_mm2"
+bool alb_form_from_name(alb_form *form, const char *name);
+
+// S(r), 1/mm^2; r >= 0 in mm.
+double alb_profile_value(const alb_profile *profile, double r_mm);
+// 2 pi integral S r dr over the plane: the share of the incident flux that leaves. Closed form.
+double alb_profile_total(const alb_profile *profile);
+// P(rho) = integral_0^rho S(r) r dr: what the exact self-term of a patch needs. Closed form.
+double alb_profile_disc(const alb_profile *profile, double rho_mm);
+
+// A profile with what is known of it.
+typedef struct alb_fitted {
+    alb_profile profile; // form NONE: not measured
+    double sd[ALB_PARAMETERS_MAX];
+    double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX];
+    double total, total_sd;
+    double chi_square;
+    int degrees_of_freedom;
+    bool identifiable;
+} alb_fitted;
+
+typedef struct alb_material {
+    char name[ALB_NAME_SIZE];
+    double thickness_mm; // 0: not a slab or not known
+    double refractive_index;
+    int channels;
+    char channel_names[3][8];
+    alb_fitted fitted[ALB_SIDES][3];
+} alb_material;
+
+bool alb_material_read(alb_material *material, const char *path, alb_error *error);
