@@ -235,12 +235,12 @@ static double pooled_variance(const ring *rings, int k)
 
 static double ring_sd(const ring *rings, int k, bool with_variance, double top)
 {
-    const ring *ring = &rings[k];
-    double variance = with_variance ? ring->propagated : pooled_variance(rings, k);
-    if (with_variance && ring->freedom &&
-        (variance <= 0 || alb_chi_square_tail(ring->squares / variance, ring->freedom) < 1e-3))
-        variance = fmax(variance, ring->squares / ring->freedom);
-    return sqrt(variance / (double)ring->count + 1e-8 * ring->value * ring->value + 1e-12 * top * top);
+    const ring *one = &rings[k];
+    double variance = with_variance ? one->propagated : pooled_variance(rings, k);
+    if (with_variance && one->freedom &&
+        (variance <= 0 || alb_chi_square_tail(one->squares / variance, one->freedom) < 1e-3))
+        variance = fmax(variance, one->squares / one->freedom);
+    return sqrt(variance / (double)one->count + 1e-8 * one->value * one->value + 1e-12 * top * top);
 }
 
 // Distance from the centre to the nearest pixel of the image's border.
