@@ -73,7 +73,7 @@ alb_axis alb_axis_make(bool logarithmic, double minimum, double maximum, double 
     widen(&minimum, &maximum, logarithmic);
     alb_axis axis = {
         .logarithmic = logarithmic, .minimum = minimum, .maximum = maximum, .first_px = first_px, .last_px = last_px};
-    wanted = wanted < 4 ? 4 : wanted;
+    wanted = wanted < 5 ? 5 : wanted; // at least two ticks then: steps grow by 2.5 at most
     if (logarithmic && floor(log10(maximum) + 1e-9) - ceil(log10(minimum) - 1e-9) >= 1)
         decade_ticks(&axis, wanted);
     else
