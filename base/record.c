@@ -224,6 +224,8 @@ bool alb_node_has(alb_node object, const char *key) { return json_object_get(obj
 
 static const char *type_name(const json_t *value)
 {
+    if (!value)
+        return "nothing";
     static const char *const names[] = {"an object", "a list", "text", "a number", "a number", "true", "false", "null"};
     return names[json_typeof(value)];
 }
