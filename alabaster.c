@@ -35,9 +35,9 @@ static void help(void)
            "help", "says how a command is used");
 }
 
-static int report(const alb_error *error, const char *command)
+static int report(const alb_error *error)
 {
-    fprintf(stderr, "alabaster%s%s: %s\n", command ? " " : "", command ? command : "", error->text);
+    fprintf(stderr, "alabaster: %s\n", error->text);
     return error->status;
 }
 
@@ -60,7 +60,7 @@ int main(int argc, char **argv)
     const alb_command *command = find(name);
     if (!command) {
         alb_fail(&error, ALB_USAGE, "no command '%.60s'; alabaster help lists them", name);
-        return report(&error, NULL);
+        return report(&error);
     }
     if (wants_help || name == argv[2]) {
         printf("%s\n", command->usage);
@@ -69,5 +69,5 @@ int main(int argc, char **argv)
     if (command->run(argc - 2, argv + 2, &error) && fflush(stdout) == 0)
         return ALB_OK;
     alb_fail(&error, ALB_ACCESS, "standard output cannot be written");
-    return report(&error, command->name);
+    return report(&error);
 }

@@ -36,6 +36,10 @@ alb_record *alb_record_parse(const char *name, const char *bytes, size_t size, a
     }
     memcpy(record->text, bytes, size);
     record->size = size;
+    if (memchr(bytes, '\0', size)) { // jansson takes a NUL behind a number for the end
+        alb_fail(error, ALB_BAD_DATA, "%s: not valid JSON: a NUL byte", name);
+        goto failed;
+    }
     json_error_t problem;
     record->top = json_loadb(bytes, size, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY, &problem);
     if (!record->top) {
@@ -224,6 +228,8 @@ bool alb_node_has(alb_node object, const char *key) { return json_object_get(obj
 
 static const char *type_name(const json_t *value)
 {
+    if (!value)
+        return "nothing";
     static const char *const names[] = {"an object", "a list", "text", "a number", "a number", "true", "false", "null"};
     return names[json_typeof(value)];
 }

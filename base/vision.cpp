@@ -2,12 +2,16 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <mutex>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/quality/qualityssim.hpp>
+#include <string>
+#include <sys/mman.h>
+#include <unistd.h>
 #include <vector>
 
 extern "C" {
@@ -35,6 +39,37 @@ template <typename Work> bool guarded(const char *name, alb_error *error, Work w
     } catch (...) {
         return alb_fail(error, ALB_INTERNAL, "%s: unexpected failure in OpenCV", name);
     }
+}
+
+// Decodes with standard error caught: libpng and libjpeg print what is wrong there and may still return half a picture.
+// `complaint` becomes the first line that tells of damage, or stays empty.
+cv::Mat decode_quietly(const cv::Mat &data, std::string &complaint)
+{
+    static std::mutex one_at_a_time;
+    const std::lock_guard<std::mutex> lock(one_at_a_time);
+    const int kept = dup(STDERR_FILENO), caught = memfd_create("stderr", MFD_CLOEXEC);
+    cv::Mat picture;
+    if (kept >= 0 && caught >= 0)
+        dup2(caught, STDERR_FILENO);
+    try {
+        picture = cv::imdecode(data, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
+    } catch (const cv::Exception &problem) {
+        complaint = problem.err;
+    }
+    if (kept >= 0 && caught >= 0) {
+        dup2(kept, STDERR_FILENO);
+        char text[2048] = "";
+        const ssize_t size = pread(caught, text, sizeof text - 1, 0);
+        for (const char *sign : {"libpng error: ", "Premature end", "Corrupt JPEG", "TIFFRead", "TIFFFill"}) {
+            const char *at = size > 0 ? std::strstr(text, sign) : nullptr;
+            if (at && complaint.empty())
+                complaint = std::string(at, std::strcspn(at, "\n"));
+        }
+    }
+    for (const int descriptor : {kept, caught})
+        if (descriptor >= 0)
+            close(descriptor);
+    return picture;
 }
 
 cv::Mat matrix(const alb_lens &l) { return (cv::Mat_<double>(3, 3) << l.fx, 0, l.cx, 0, l.fy, l.cy, 0, 0, 1); }
@@ -79,6 +114,22 @@ double rms(const std::vector<cv::Point2f> &a, const std::vector<cv::Point2f> &b)
         sum += std::pow(static_cast<double>(a[i].x - b[i].x), 2) + std::pow(static_cast<double>(a[i].y - b[i].y), 2);
     return std::sqrt(sum / static_cast<double>(a.size()));
 }
+// cornerSubPix in a window that stays clear of the neighbouring corners: a third of the smallest spacing, 11 px at
+// most.
+void refine(const cv::Mat &picture, std::vector<cv::Point2f> &points, int columns)
+{
+    const size_t row = static_cast<size_t>(columns);
+    double spacing = 1e9;
+    for (size_t i = 1; i < points.size(); i++) {
+        if (i % row)
+            spacing = std::min(spacing, cv::norm(points[i] - points[i - 1]));
+        if (i >= row)
+            spacing = std::min(spacing, cv::norm(points[i] - points[i - row]));
+    }
+    const int half = std::max(2, std::min(11, static_cast<int>(spacing * 0.36)));
+    cv::cornerSubPix(picture, points, cv::Size(half, half), cv::Size(-1, -1),
+                     cv::TermCriteria(cv::TermCriteria::EPS + cv::TermCriteria::MAX_ITER, 50, 1e-4));
+}
 } // namespace
 
 extern "C" bool alb_vision_decode(alb_image *image, int *bits, const void *bytes, size_t size, const char *name,
@@ -87,9 +138,11 @@ extern "C" bool alb_vision_decode(alb_image *image, int *bits, const void *bytes
     *image = alb_image();
     return guarded(name, error, [&] {
         const cv::Mat data(1, static_cast<int>(size), CV_8U, const_cast<void *>(bytes));
-        cv::Mat picture = cv::imdecode(data, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
-        if (picture.empty())
-            return alb_fail(error, ALB_BAD_DATA, "%s: not a readable image (EXR, PNG, TIFF, JPEG, PFM or HDR)", name);
+        std::string complaint;
+        cv::Mat picture = decode_quietly(data, complaint);
+        if (picture.empty() || !complaint.empty())
+            return alb_fail(error, ALB_BAD_DATA, "%s: not a readable image (EXR, PNG, TIFF, JPEG, PFM or HDR)%s%s",
+                            name, complaint.empty() ? "" : ": ", complaint.c_str());
         const int depth = picture.depth(), channels = picture.channels();
         if ((depth != CV_8U && depth != CV_16U && depth != CV_32F) || (channels != 1 && channels != 3))
             return alb_fail(error, ALB_BAD_DATA, "%s: an image of this depth or number of channels is not read", name);
@@ -141,9 +194,10 @@ extern "C" bool alb_vision_chessboard(double *corners, bool *found, const alb_im
         const cv::Size size(columns, rows);
         *found =
             cv::findChessboardCornersSB(picture, size, points, cv::CALIB_CB_ACCURACY | cv::CALIB_CB_NORMALIZE_IMAGE);
-        if (!*found && (*found = cv::findChessboardCorners(picture, size, points)))
-            cv::cornerSubPix(picture, points, cv::Size(11, 11), cv::Size(-1, -1),
-                             cv::TermCriteria(cv::TermCriteria::EPS + cv::TermCriteria::MAX_ITER, 50, 1e-4));
+        if (!*found)
+            *found = cv::findChessboardCorners(picture, size, points);
+        if (*found)
+            refine(picture, points, columns);
         *found = *found && points.size() == static_cast<size_t>(columns) * static_cast<size_t>(rows);
         for (size_t i = 0; *found && i < points.size(); i++) {
             corners[2 * i] = static_cast<double>(points[i].x);

@@ -17,7 +17,7 @@ typedef struct alb_view {
     bool known;
     alb_camera camera; // world: the plane of the face, z = 0; origin the middle of the board's corners, x along its
                        // columns, y against its rows, z out of the face towards the camera; mm
-    double rms_px; // of the board photograph that gave the pose
+    double rms_px;     // of the board photograph that gave the pose
 } alb_view;
 
 // Product of one shot.
