@@ -185,7 +185,7 @@ static bool measure(alb_comparison *out, alb_error *error)
     return true;
 }
 
-// The brightest 5 x 5 mean over compared pixels and channels.
+// The compared pixel with the brightest 5 x 5 mean over compared pixels and channels about it.
 static void find_spot(alb_comparison *out)
 {
     double brightest = -INFINITY;
@@ -202,7 +202,7 @@ static void find_spot(alb_comparison *out)
                     for (int c = 0; c < out->channels; c++)
                         sum += (double)alb_image_at(&out->photo, u, v)[c];
                 }
-            if (count && sum / count > brightest)
+            if (out->used[(size_t)y * (size_t)out->photo.width + (size_t)x] && sum / count > brightest)
                 brightest = sum / count, out->spot_x = x, out->spot_y = y;
         }
 }
