@@ -72,7 +72,7 @@ static void merge_reaches_the_bound(void **state)
     assert_true(efficiencies[LEVELS / 2] > 0.97); // sampling error of an efficiency: sqrt(2 / 4000) = 2.2 %
     assert_true(least > 0.90);
     assert_true(worst_bias < 3e-3);
-    assert_true(worst_variance < 0.12);
+    assert_true(worst_variance < 0.15); // 5 % but for the level where the longest useful exposure is about to clip
 }
 
 static void saturated_in_all_is_not_measured(void **state)
