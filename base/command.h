@@ -14,8 +14,8 @@ typedef struct alb_command {
 
 // Options of a command line, declared as a table and read in one pass.
 typedef struct alb_option {
-    const char *name;   // "--rig"; NULL: the positional arguments, in order, one row each
-    const char *label;  // what a positional argument is called in messages: "PLAN.json"
+    const char *name;  // "--rig"; NULL: the positional arguments, in order, one row each
+    const char *label; // what a positional argument is called in messages: "PLAN.json"
     bool required;
     const char **value; // where the text goes (borrowed from argv)
     bool *flag;         // or: an option without a value
@@ -24,7 +24,8 @@ typedef struct alb_option {
 // Fills the options; ALB_USAGE names what is unknown, repeated, missing or in excess. "--name=value" works too.
 bool alb_options_read(const alb_option *options, int option_count, int argc, char **argv, alb_error *error);
 // A number given on the command line as `name`: finite and within the bounds, nothing behind it.
-bool alb_option_number(double *out, const char *name, const char *text, double minimum, double maximum, alb_error *error);
+bool alb_option_number(double *out, const char *name, const char *text, double minimum, double maximum,
+                       alb_error *error);
 
 extern const alb_command alb_capture_command, alb_calibrate_command, alb_fit_command, alb_render_command,
     alb_compare_command, alb_status_command;

@@ -1,5 +1,5 @@
-// OpenEXR files by OpenEXRCore: single-part, flat, scan lines or tiles (level 0), any channel names; half, float and uint
-// all become float32. The data window becomes the image.
+// OpenEXR files by OpenEXRCore: single-part, flat, scan lines or tiles (level 0), any channel names; half, float and
+// uint all become float32. The data window becomes the image.
 #pragma once
 #include "base/image.h"
 

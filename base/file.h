@@ -8,7 +8,8 @@ enum { ALB_PATH_SIZE = 4096, ALB_HASH_SIZE = 65 };
 
 bool alb_file_exists(const char *path);
 bool alb_file_is_directory(const char *path);
-// Reads the whole file; *bytes is NUL-terminated one past *size and owned by the caller (free). Refuses files over 2 GiB.
+// Reads the whole file; *bytes is NUL-terminated one past *size and owned by the caller (free). Refuses files over 2
+// GiB.
 bool alb_file_read(char **bytes, size_t *size, const char *path, alb_error *error);
 // Writes to a temporary name beside `path` and renames: `path` holds the old bytes or the new ones, never a part.
 bool alb_file_write(const char *path, const void *bytes, size_t size, alb_error *error);

@@ -7,8 +7,8 @@
 typedef enum alb_mark { ALB_MARK_LINE, ALB_MARK_DASHES, ALB_MARK_POINTS, ALB_MARK_LINE_AND_POINTS } alb_mark;
 
 typedef struct alb_curve {
-    const char *label;  // NULL: not in the legend
-    const char *colour; // any SVG colour; NULL takes the next of the palette
+    const char *label;        // NULL: not in the legend
+    const char *colour;       // any SVG colour; NULL takes the next of the palette
     const double *x, *y, *sd; // sd may be NULL: vertical bars of one sd where given
     size_t count;
     alb_mark mark;
@@ -26,4 +26,5 @@ typedef struct alb_panel {
 // Appends one <svg> element. Points that are not finite are left out; an empty panel says "no data".
 void alb_plot_add(alb_text *svg, const alb_panel *panels, size_t panel_count, int width, int height);
 // The same as a file.
-bool alb_plot_write(const char *path, const alb_panel *panels, size_t panel_count, int width, int height, alb_error *error);
+bool alb_plot_write(const char *path, const alb_panel *panels, size_t panel_count, int width, int height,
+                    alb_error *error);

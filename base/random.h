@@ -18,7 +18,10 @@ static inline uint64_t alb_random_bits(alb_random *random)
     return result;
 }
 // In [0, 1), 53 bits.
-static inline double alb_random_uniform(alb_random *random) { return (double)(alb_random_bits(random) >> 11) * 0x1p-53; }
+static inline double alb_random_uniform(alb_random *random)
+{
+    return (double)(alb_random_bits(random) >> 11) * 0x1p-53;
+}
 // Standard normal (Box-Muller, one of the pair).
 double alb_random_normal(alb_random *random);
 // Poisson of the given mean: exact below 30 (inversion), transformed rejection PTRS above (Hormann 1993).

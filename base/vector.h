@@ -33,7 +33,10 @@ static inline alb_vector alb_rotate(const alb_transform *t, alb_vector a)
     return (alb_vector){r[0][0] * a.x + r[0][1] * a.y + r[0][2] * a.z, r[1][0] * a.x + r[1][1] * a.y + r[1][2] * a.z,
                         r[2][0] * a.x + r[2][1] * a.y + r[2][2] * a.z};
 }
-static inline alb_vector alb_apply(const alb_transform *t, alb_vector a) { return alb_add(alb_rotate(t, a), t->translation); }
+static inline alb_vector alb_apply(const alb_transform *t, alb_vector a)
+{
+    return alb_add(alb_rotate(t, a), t->translation);
+}
 static inline alb_transform alb_inverse(const alb_transform *t)
 {
     alb_transform inverse;

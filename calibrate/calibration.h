@@ -1,7 +1,7 @@
 // A calibration: what calibrate leaves behind. calibration.json and calibration/*.exr inside the session's folder.
 //
-// Products: calibration/<shot>.exr for every slab shot and every spot or grid on the white reference: channels R,G,B and
-// variance.R, variance.G, variance.B.
+// Products: calibration/<shot>.exr for every slab shot and every spot or grid on the white reference: channels R,G,B
+// and variance.R, variance.G, variance.B.
 //   slab:            radiance per incident flux, L / Phi, 1/(mm^2 sr); a Lambertian face has M = pi L
 //   white reference: irradiance per incident flux, E / Phi, 1/mm^2 (its integral over the face is 1 by construction)
 // A pixel that no exposure measured (saturated in all) is NaN.
@@ -15,8 +15,8 @@ typedef struct alb_estimate {
 
 typedef struct alb_view {
     bool known;
-    alb_camera camera; // world: the plane of the face, z = 0; origin the middle of the board's corners, x along its columns,
-                       // y against its rows, z out of the face towards the camera; mm
+    alb_camera camera; // world: the plane of the face, z = 0; origin the middle of the board's corners, x along its
+                       // columns, y against its rows, z out of the face towards the camera; mm
     double rms_px;     // of the board photograph that gave the pose
 } alb_view;
 

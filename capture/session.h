@@ -59,7 +59,7 @@ typedef struct alb_plan {
     char sample[ALB_NAME_SIZE]; // name of the material
     double thickness_mm;
     double refractive_index;
-    double white_reflectance[3]; // of the white reference, per channel
+    double white_reflectance[3];   // of the white reference, per channel
     int board_columns, board_rows; // inner corners
     double board_square_mm;
     alb_shot shots[ALB_SHOTS_MAX];
@@ -81,5 +81,5 @@ bool alb_plan_read(alb_plan *plan, const char *path, alb_error *error);
 bool alb_session_write(const alb_session *session, const alb_provenance *provenance, alb_error *error);
 bool alb_session_read(alb_session *session, const char *folder, alb_error *error);
 // Path of a frame.
-bool alb_session_frame(char path[ALB_PATH_SIZE], const alb_session *session, const alb_shot *shot, int exposure, int repeat,
-                       alb_error *error);
+bool alb_session_frame(char path[ALB_PATH_SIZE], const alb_session *session, const alb_shot *shot, int exposure,
+                       int repeat, alb_error *error);

@@ -1,5 +1,5 @@
-// A material: what fit leaves behind and render reads (material.json). Per channel and side a radially symmetric profile
-// S(r): radiant exitance at distance r per unit incident flux, 1/mm^2.
+// A material: what fit leaves behind and render reads (material.json). Per channel and side a radially symmetric
+// profile S(r): radiant exitance at distance r per unit incident flux, 1/mm^2.
 #pragma once
 #include "base/error.h"
 #include "capture/session.h" // alb_side
@@ -23,7 +23,7 @@ typedef struct alb_profile {
 } alb_profile;
 
 int alb_form_parameter_count(alb_form form);
-const char *alb_form_name(alb_form form);            // "two_exponentials"
+const char *alb_form_name(alb_form form);                  // "two_exponentials"
 const char *alb_form_parameter_name(alb_form form, int i); // "amplitude_1_per_mm2"
 bool alb_form_from_name(alb_form *form, const char *name);
 

@@ -22,7 +22,8 @@
 // The call returned true; prints the error otherwise.
 #define check_ok(call, error) check_ok_at((call), (error), #call, __FILE__, __LINE__)
 // The call returned false with the status, and its text contains `part`.
-#define check_fails(call, error, status_, part) check_fails_at((call), (error), (status_), (part), #call, __FILE__, __LINE__)
+#define check_fails(call, error, status_, part)                                                                        \
+    check_fails_at((call), (error), (status_), (part), #call, __FILE__, __LINE__)
 
 static inline void check_near_at(double a, double b, double tolerance, const char *what, const char *file, int line)
 {

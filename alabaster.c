@@ -1,0 +1,73 @@
+// alabaster: the table of commands. Each stage's command.c is one row; `alabaster help` prints this table.
+#include "base/command.h"
+#include <stdio.h>
+#include <string.h>
+
+#pragma weak alb_capture_command
+#pragma weak alb_calibrate_command
+#pragma weak alb_fit_command
+#pragma weak alb_render_command
+#pragma weak alb_compare_command
+
+static const alb_command *const commands[] = {
+    &alb_capture_command, &alb_calibrate_command, &alb_fit_command, &alb_render_command, &alb_compare_command,
+};
+enum { COMMANDS = sizeof commands / sizeof commands[0] };
+
+static const alb_command *find(const char *name)
+{
+    for (int i = 0; i < COMMANDS; i++)
+        if (commands[i] && !strcmp(commands[i]->name, name))
+            return commands[i];
+    return NULL;
+}
+
+static void help(void)
+{
+    printf("alabaster measures how translucent materials scatter light, and renders them beside their photograph\n\n"
+           "usage: alabaster COMMAND ...\n\n");
+    for (int i = 0; i < COMMANDS; i++)
+        if (commands[i])
+            printf("  %-10s %s\n", commands[i]->name, commands[i]->summary);
+    printf("  %-10s %s\n\nalabaster help COMMAND tells more; alabaster --version names the version.\n"
+           "exit codes: 0 ok, 1 differs, 2 usage, 3 access, 4 bad data, 5 the measurement does not decide,\n"
+           "            6 memory, 7 internal\n",
+           "help", "says how a command is used");
+}
+
+static int report(const alb_error *error)
+{
+    fprintf(stderr, "alabaster: %s\n", error->text);
+    return error->status;
+}
+
+int main(int argc, char **argv)
+{
+    alb_error error = {0};
+    const char *name = argc > 1 ? argv[1] : "help";
+    const bool wants_help = argc > 2 && (!strcmp(argv[2], "--help") || !strcmp(argv[2], "-h"));
+    if (!strcmp(name, "--version")) {
+        printf("alabaster %s\n", ALB_VERSION);
+        return ALB_OK;
+    }
+    if (!strcmp(name, "help") || !strcmp(name, "--help") || !strcmp(name, "-h")) {
+        if (argc < 3) {
+            help();
+            return ALB_OK;
+        }
+        name = argv[2];
+    }
+    const alb_command *command = find(name);
+    if (!command) {
+        alb_fail(&error, ALB_USAGE, "no command '%.60s'; alabaster help lists them", name);
+        return report(&error);
+    }
+    if (wants_help || name == argv[2]) {
+        printf("%s\n", command->usage);
+        return ALB_OK;
+    }
+    if (command->run(argc - 2, argv + 2, &error) && fflush(stdout) == 0)
+        return ALB_OK;
+    alb_fail(&error, ALB_ACCESS, "standard output cannot be written");
+    return report(&error);
+}

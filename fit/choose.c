@@ -1,0 +1,316 @@
+// Which form, and what is known of it.
+//
+// 1. Each form is fitted by the noise alone. The richer one is taken where it lowers chi-square by more than
+//    max(10.6, 2 ln n): a likelihood-ratio test at 1 % shared by the two candidates with a second term (chi-square of
+//    two degrees of freedom at 0.5 %), or BIC, whichever asks more. Between equally rich forms the smaller chi-square
+//    decides.
+// 2. A form stands where P(chi-square) >= 1e-3. Then its parameters, covariance and total are those of this fit, and
+//    nothing else enters.
+// 3. Where no form stands, the form is an approximation and its errors are not those of the noise. Each reading then
+// gets a
+//    relative discrepancy t in quadrature, sd_i^2 + (t f_i)^2, with t such that chi-square equals its degrees of
+//    freedom (this inflates the covariance), and the energy that the image itself shows, sum value * area, becomes one
+//    more reading with the small sd the noise gives it: the fitted form conserves the measured energy, whatever it does
+//    between. Without that, two exponentials lose 8 % of the energy of a real reflection. Half of the share beyond the
+//    readings is added to the sd of the total. The form of least sum ln(sd_i^2 + t^2 f_i^2) + k ln n is taken.
+// 4. The sd of the common scale enters last: covariance += a a^T s^2 over the amplitudes, total likewise.
+//
+// The data do not decide where J^T J is singular, a parameter is uncertain by more than half of itself, a decay is
+// slower than a tenth of the range shows, or more than half of the total lies where nothing was measured.
+#include "fit/choose.h"
+#include "base/memory.h"
+#include "base/statistics.h"
+#include "fit/search.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double reject_tail = 1e-3, gain_wanted = 10.6, relative_sd_limit = 0.5, measured_share_wanted = 0.5;
+static const alb_form candidates[ALB_ATTEMPTS_MAX] = {ALB_FORM_EXPONENTIAL, ALB_FORM_TWO_EXPONENTIALS,
+                                                      ALB_FORM_SIGNED_EXPONENTIALS};
+
+typedef struct fit {
+    alb_profile profile;
+    bool found;
+    double chi_square;
+    double discrepancy, score;
+} fit;
+
+static bool fit_by_noise(fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, const alb_basis *basis,
+                         const alb_weighing *noise, alb_error *error)
+{
+    const int n = noise->readings->count;
+    outcome->attempt_count = ALB_ATTEMPTS_MAX;
+    for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
+        alb_attempt *attempt = &outcome->attempts[f];
+        const int parameters = alb_form_parameter_count(candidates[f]);
+        *attempt = (alb_attempt){candidates[f], (double)NAN, (double)NAN, n - parameters, ""};
+        if (n < parameters + 1) {
+            snprintf(attempt->rejected, ALB_REASON_SIZE, "%d readings are too few for %d parameters", n, parameters);
+            continue;
+        }
+        if (!alb_search(&fits[f].profile, &fits[f].chi_square, &fits[f].found, candidates[f], basis, noise, error))
+            return false;
+        if (fits[f].found) {
+            attempt->chi_square = fits[f].chi_square;
+            attempt->bic = fits[f].chi_square + parameters * log(n);
+        } else {
+            snprintf(attempt->rejected, ALB_REASON_SIZE, "no term of this sign lowers chi-square");
+        }
+    }
+    return true;
+}
+
+// Index of the form to take by the noise, -1 where none was found; *stands whether the noise lets it stand.
+static int simplest(bool *stands, const fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, int n)
+{
+    int rich = -1;
+    for (int f = 1; f < ALB_ATTEMPTS_MAX; f++)
+        if (fits[f].found && (rich < 0 || fits[f].chi_square < fits[rich].chi_square))
+            rich = f;
+    const double threshold = fmax(gain_wanted, 2 * log(n));
+    const double gain = rich >= 0 && fits[0].found ? fits[0].chi_square - fits[rich].chi_square : 0;
+    const int chosen = !fits[0].found ? rich : gain > threshold ? rich : 0;
+    for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
+        alb_attempt *attempt = &outcome->attempts[f];
+        if (f == chosen || !fits[f].found)
+            continue;
+        const double tail = alb_chi_square_tail(attempt->chi_square, attempt->degrees_of_freedom);
+        if (tail < reject_tail)
+            snprintf(attempt->rejected, ALB_REASON_SIZE, "chi-square %.5g for %d degrees of freedom (tail %.2g)",
+                     attempt->chi_square, attempt->degrees_of_freedom, tail);
+        else if (f == 0)
+            snprintf(attempt->rejected, ALB_REASON_SIZE, "a second term lowers chi-square by %.4g, more than %.4g",
+                     gain, threshold);
+        else if (chosen == 0)
+            snprintf(attempt->rejected, ALB_REASON_SIZE, "lowers chi-square by %.4g only, %.4g wanted",
+                     fits[0].chi_square - fits[f].chi_square, threshold);
+        else
+            snprintf(attempt->rejected, ALB_REASON_SIZE, "chi-square larger by %.4g",
+                     fits[f].chi_square - fits[chosen].chi_square);
+    }
+    *stands = chosen >= 0 &&
+              alb_chi_square_tail(fits[chosen].chi_square, outcome->attempts[chosen].degrees_of_freedom) >= reject_tail;
+    return chosen;
+}
+
+// The t of sum residual^2 / (sd^2 + t^2 fitted^2) = freedom, by bisection in ln t; 0 where the noise suffices.
+static double discrepancy_of(const alb_readings *readings, const double *fitted, int freedom)
+{
+    double low = 1e-9, high = 1e3;
+    for (int iteration = 0; iteration < 60; iteration++) {
+        const double middle = sqrt(low * high);
+        double sum = 0;
+        for (int i = 0; i < readings->count; i++) {
+            const double residual = readings->value[i] - fitted[i], extra = middle * fitted[i];
+            sum += residual * residual / (readings->sd[i] * readings->sd[i] + extra * extra);
+        }
+        if (sum > freedom)
+            low = middle;
+        else
+            high = middle;
+    }
+    return high;
+}
+
+static void widen(double *sd, const alb_readings *readings, const double *fitted, double discrepancy)
+{
+    for (int i = 0; i < readings->count; i++)
+        sd[i] = hypot(readings->sd[i], discrepancy * fitted[i]);
+}
+
+// One form with its discrepancy and with the energy; sd has room for the readings and holds the widened ones at the
+// end.
+static bool fit_with_discrepancy(fit *out, double *sd, alb_form form, const alb_basis *basis, const alb_weighing *noise,
+                                 double energy_sd, alb_error *error)
+{
+    const alb_readings *readings = noise->readings;
+    const alb_weighing widened = {readings, noise->forward, sd, energy_sd};
+    const int parameters = alb_form_parameter_count(form);
+    widen(sd, readings, readings->value, 0.1);
+    if (!alb_search(&out->profile, &out->chi_square, &out->found, form, basis, &widened, error))
+        return false;
+    for (int iteration = 0; out->found && iteration < 12; iteration++) {
+        double *fitted = alb_operator_readings(noise->forward, &out->profile, error);
+        if (!fitted)
+            return false;
+        const double before = out->discrepancy;
+        out->discrepancy = discrepancy_of(readings, fitted, readings->count - parameters);
+        widen(sd, readings, fitted, out->discrepancy);
+        free(fitted);
+        if (!alb_search_polish(&out->profile, &out->chi_square, &widened, error))
+            return false;
+        if (fabs(out->discrepancy - before) < 1e-4 * before)
+            break;
+    }
+    out->score = parameters * log(readings->count);
+    for (int i = 0; i < readings->count; i++)
+        out->score += 2 * log(sd[i]);
+    return true;
+}
+
+static bool choose_with_discrepancy(fit *chosen, double *sd, alb_outcome *outcome, const alb_basis *basis,
+                                    const alb_weighing *noise, double energy_sd, alb_error *error)
+{
+    fit fits[ALB_ATTEMPTS_MAX] = {{.found = false}};
+    int best = -1;
+    for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
+        if (noise->readings->count < alb_form_parameter_count(candidates[f]) + 1)
+            continue;
+        if (!fit_with_discrepancy(&fits[f], sd, candidates[f], basis, noise, energy_sd, error))
+            return false;
+        if (fits[f].found && (best < 0 || fits[f].score < fits[best].score))
+            best = f;
+    }
+    if (best < 0)
+        return alb_fail(error, ALB_UNDECIDED,
+                        "no sum of exponentials follows the readings: they do not fall with distance");
+    for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
+        outcome->attempts[f].rejected[0] = '\0';
+        if (f != best && fits[f].found)
+            snprintf(outcome->attempts[f].rejected, ALB_REASON_SIZE,
+                     "no form fits within the noise; this one misses by %.3g relative, the chosen one by %.3g",
+                     fits[f].discrepancy, fits[best].discrepancy);
+        else if (f != best)
+            snprintf(outcome->attempts[f].rejected, ALB_REASON_SIZE, "no term of this sign lowers chi-square");
+    }
+    // the widened sd of the best one are wanted, not those of the last
+    double *fitted = alb_operator_readings(noise->forward, &fits[best].profile, error);
+    if (!fitted)
+        return false;
+    widen(sd, noise->readings, fitted, fits[best].discrepancy);
+    free(fitted);
+    *chosen = fits[best];
+    return true;
+}
+
+static double quadratic_form(const double *gradient, const alb_fitted *fitted, int n)
+{
+    double sum = 0;
+    for (int p = 0; p < n; p++)
+        for (int q = 0; q < n; q++)
+            sum += gradient[p] * fitted->covariance[p][q] * gradient[q];
+    return sum > 0 ? sum : 0;
+}
+
+static void describe_tail(alb_outcome *outcome, const alb_readings *readings)
+{
+    const alb_profile *profile = &outcome->fitted.profile;
+    const int n = alb_form_parameter_count(profile->form);
+    const double from = readings->r_mm[readings->count / 2], to = readings->r_mm[readings->count - 1];
+    double g0[ALB_PARAMETERS_MAX], g1[ALB_PARAMETERS_MAX], gradient[ALB_PARAMETERS_MAX];
+    const double s0 = alb_profile_gradient(g0, profile, from), s1 = alb_profile_gradient(g1, profile, to);
+    for (int p = 0; p < n; p++)
+        gradient[p] = (g1[p] / s1 - g0[p] / s0) / (to - from);
+    outcome->slope_from_mm = from;
+    outcome->slope_to_mm = to;
+    outcome->slope_per_mm = log(s1 / s0) / (to - from);
+    outcome->slope_sd = sqrt(quadratic_form(gradient, &outcome->fitted, n));
+}
+
+static void judge(alb_outcome *outcome, const alb_readings *readings, bool full_rank)
+{
+    const alb_fitted *fitted = &outcome->fitted;
+    const alb_profile *profile = &fitted->profile;
+    char *why = outcome->undecided;
+    if (!full_rank) {
+        snprintf(why, ALB_REASON_SIZE, "the parameters of %s trade off fully: the Jacobian is rank-deficient",
+                 alb_form_name(profile->form));
+    } else if (!(outcome->measured_share >= measured_share_wanted)) {
+        snprintf(why, ALB_REASON_SIZE, "%.0f %% of the total lies where nothing was measured (readings end at %.4g mm)",
+                 100 * (1 - outcome->measured_share), readings->outer_mm);
+    } else {
+        for (int p = 0; p < alb_form_parameter_count(profile->form) && !*why; p++)
+            if (!(fitted->sd[p] <= relative_sd_limit * fabs(profile->parameters[p])))
+                snprintf(why, ALB_REASON_SIZE, "%s = %.4g +- %.2g: uncertain by more than half of itself",
+                         alb_form_parameter_name(profile->form, p), profile->parameters[p], fitted->sd[p]);
+        if (!*why && profile->parameters[1] * readings->outer_mm < 0.1)
+            snprintf(why, ALB_REASON_SIZE, "the slow term (%.3g per mm) does not decay within the readings (%.4g mm)",
+                     profile->parameters[1], readings->outer_mm);
+    }
+    outcome->fitted.identifiable = !*why;
+}
+
+static bool complete(alb_outcome *outcome, const alb_readings *readings, const alb_weighing *weighing, double energy_sd,
+                     double relative_scale_sd, alb_error *error)
+{
+    alb_fitted *fitted = &outcome->fitted;
+    const alb_profile *profile = &fitted->profile;
+    const int n = alb_form_parameter_count(profile->form);
+    bool full_rank;
+    double gradient[ALB_PARAMETERS_MAX];
+    if (!alb_search_covariance(fitted->covariance, &full_rank, profile, weighing, error))
+        return false;
+    fitted->total = alb_profile_total_gradient(gradient, profile);
+    const double beyond = fitted->total - 2 * M_PI * alb_profile_disc(profile, readings->outer_mm);
+    const double core = 2 * M_PI * alb_profile_disc(profile, readings->core_mm);
+    double variance = quadratic_form(gradient, fitted, n);
+    if (outcome->discrepancy_relative > 0)
+        variance = fmax(variance, energy_sd * energy_sd) + 0.25 * (beyond * beyond + core * core);
+    outcome->measured_share = 1 - (beyond + core) / fitted->total;
+    for (int p = 0; p < n; p += 2)
+        for (int q = 0; q < n; q += 2)
+            fitted->covariance[p][q] +=
+                profile->parameters[p] * profile->parameters[q] * relative_scale_sd * relative_scale_sd;
+    fitted->total_sd = sqrt(variance + fitted->total * fitted->total * relative_scale_sd * relative_scale_sd);
+    for (int p = 0; p < n; p++)
+        fitted->sd[p] = sqrt(fitted->covariance[p][p]);
+    double *model = alb_operator_readings(weighing->forward, profile, error);
+    if (!model)
+        return false;
+    double squares = 0;
+    int counted = 0;
+    for (int i = 0; i < readings->count; i++) {
+        const double residual = readings->value[i] - model[i], whitened = residual / readings->sd[i];
+        fitted->chi_square += whitened * whitened;
+        if (model[i] > 3 * readings->sd[i]) {
+            squares += residual * residual / (model[i] * model[i]);
+            counted++;
+        }
+    }
+    free(model);
+    fitted->degrees_of_freedom = readings->count - n;
+    outcome->rms_relative = counted ? sqrt(squares / counted) : 0;
+    describe_tail(outcome, readings);
+    judge(outcome, readings, full_rank);
+    return true;
+}
+
+bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward,
+                double relative_scale_sd, alb_error *error)
+{
+    bool ok = false, stands;
+    alb_basis basis = {0};
+    fit fits[ALB_ATTEMPTS_MAX] = {{.found = false}}, widened = {.found = false};
+    *outcome = (alb_outcome){0};
+    if (readings->count < 3)
+        return alb_fail(error, ALB_UNDECIDED, "%d readings do not decide between profiles; 3 at least",
+                        readings->count);
+    double *sd = alb_allocate((size_t)readings->count, sizeof(double), error), energy_variance = 0;
+    if (!sd || !alb_basis_create(&basis, readings, forward, error))
+        goto done;
+    memcpy(sd, readings->sd, (size_t)readings->count * sizeof(double));
+    for (int i = 0; i < readings->count; i++)
+        energy_variance += pow(readings->area_mm2[i] * readings->sd[i], 2);
+    const double energy_sd = hypot(sqrt(energy_variance), 1e-4 * fabs(alb_energy(readings, readings->value)));
+    alb_weighing weighing = {readings, forward, sd, 0};
+    if (!fit_by_noise(fits, outcome, &basis, &weighing, error))
+        goto done;
+    const int chosen = simplest(&stands, fits, outcome, readings->count);
+    if (stands) {
+        outcome->fitted.profile = fits[chosen].profile;
+    } else {
+        const alb_weighing noise = {readings, forward, readings->sd, 0};
+        if (!choose_with_discrepancy(&widened, sd, outcome, &basis, &noise, energy_sd, error))
+            goto done;
+        outcome->fitted.profile = widened.profile;
+        outcome->discrepancy_relative = widened.discrepancy;
+        weighing.energy_sd = energy_sd;
+    }
+    ok = complete(outcome, readings, &weighing, energy_sd, relative_scale_sd, error);
+done:
+    alb_basis_free(&basis);
+    free(sd);
+    return ok;
+}

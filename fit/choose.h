@@ -1,0 +1,28 @@
+// The simplest form that the noise does not reject, and what is known of it.
+#pragma once
+#include "fit/operator.h"
+
+enum { ALB_ATTEMPTS_MAX = 3, ALB_REASON_SIZE = 320 };
+
+typedef struct alb_attempt {
+    alb_form form;
+    double chi_square, bic; // by the noise alone; NaN where the form was not fitted
+    int degrees_of_freedom;
+    char rejected[ALB_REASON_SIZE]; // empty: the one that was chosen
+} alb_attempt;
+
+typedef struct alb_outcome {
+    alb_fitted fitted;
+    alb_attempt attempts[ALB_ATTEMPTS_MAX];
+    int attempt_count;
+    double discrepancy_relative; // 0: the form fits within the noise
+    double rms_relative;         // (measured - fitted) / fitted over the readings above 3 sd
+    double measured_share;       // share of the total within the readings
+    double slope_per_mm, slope_sd, slope_from_mm, slope_to_mm; // d ln S / dr over the outer half of the readings
+    char undecided[ALB_REASON_SIZE]; // why the data do not decide; empty where they do (fitted.identifiable)
+} alb_outcome;
+
+// relative_scale_sd is that of a factor common to all readings. ALB_UNDECIDED where there are fewer than 3 readings;
+// where the data do not decide between parameters it succeeds, with the best guess and the reason.
+bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward,
+                double relative_scale_sd, alb_error *error);

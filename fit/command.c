@@ -1,0 +1,183 @@
+// alabaster fit: readings of a lit spot -> material.
+#include "base/command.h"
+#include "base/memory.h"
+#include "fit/source.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char usage[] =
+    "usage: alabaster fit SESSION [-o DIR] [--json]\n"
+    "       alabaster fit --image R.exr [--transmission T.exr] --mm-per-pixel S [--spot-radius-mm P] -o DIR [--json]\n"
+    "       alabaster fit --table PROFILE.csv --side reflection|transmission -o DIR [--json]\n"
+    "\n"
+    "Fits per channel and side the profile S(r), radiant exitance per incident flux, 1/mm^2, with the simplest of one\n"
+    "exponential, two, or two with one negative amplitude that the noise does not reject.\n"
+    "Writes DIR/material.json and DIR/report/fit.html, fit.svg, fit.csv. DIR is SESSION where it is not given.\n"
+    "\n"
+    "Images are looked at square on and hold radiant exitance per incident flux in 1/mm^2; in another unit the "
+    "amplitudes\n"
+    "and totals are in that unit. Pixels are samples of S seen through a flat round spot of radius P (0: a pencil "
+    "beam).\n"
+    "A table has the columns r_mm,value_per_mm2 and optionally sd_per_mm2.\n"
+    "\n"
+    "Exit code 5: the data do not decide; the files hold the best guess, marked so, and say why.";
+
+typedef struct request {
+    const char *session, *reflection, *transmission, *table, *side, *out;
+    double mm_per_pixel, spot_radius_mm;
+    bool as_json;
+} request;
+
+static bool check_request(request *r, const char *pixel, const char *radius, alb_error *error)
+{
+    const bool images = r->reflection || r->transmission;
+    if ((r->session != NULL) + images + (r->table != NULL) != 1)
+        return alb_fail(error, ALB_USAGE,
+                        "one of SESSION, --image and --table is wanted; 'alabaster help fit' tells more");
+    if (images != (pixel != NULL))
+        return alb_fail(error, ALB_USAGE,
+                        images ? "--image wants --mm-per-pixel: millimetres on the face between pixels"
+                               : "--mm-per-pixel goes with --image");
+    if (radius && !images)
+        return alb_fail(error, ALB_USAGE, "--spot-radius-mm goes with --image");
+    if ((r->table != NULL) != (r->side != NULL))
+        return alb_fail(error, ALB_USAGE, "--table wants --side reflection or --side transmission, and only it does");
+    if (r->side && strcmp(r->side, alb_side_names[0]) != 0 && strcmp(r->side, alb_side_names[1]) != 0)
+        return alb_fail(error, ALB_USAGE, "--side %.40s: reflection or transmission is wanted", r->side);
+    if (!r->session && !r->out)
+        return alb_fail(error, ALB_USAGE, "-o DIR is wanted: where material.json goes");
+    if (!r->out)
+        r->out = r->session;
+    return (!pixel || alb_option_number(&r->mm_per_pixel, "--mm-per-pixel", pixel, 1e-9, 1e9, error)) &&
+           (!radius || alb_option_number(&r->spot_radius_mm, "--spot-radius-mm", radius, 0, 1e9, error));
+}
+
+static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
+{
+    const alb_outcome *outcome = &fitting->sides[side][c].outcome;
+    const alb_fitted *fitted = &outcome->fitted;
+    printf("%-12s %-2s %-20s total %.5g +- %.2g", alb_side_names[side], fitting->material.channel_names[c],
+           alb_form_name(fitted->profile.form), fitted->total, fitted->total_sd);
+    for (int p = 0; p < alb_form_parameter_count(fitted->profile.form); p++)
+        printf("  %c%d %.4g +- %.2g", p % 2 ? 'b' : 'a', p / 2 + 1, fitted->profile.parameters[p], fitted->sd[p]);
+    printf("  chi-square %.4g / %d, rms %.2f %%%s\n", fitted->chi_square, fitted->degrees_of_freedom,
+           100 * outcome->rms_relative, fitted->identifiable ? "" : "  NOT DECIDED");
+}
+
+// What a reader should know; *failure is filled with the first reason not to trust the result.
+static void examine(alb_fitting *fitting, bool absolute, alb_text *notes, alb_error *failure)
+{
+    const alb_material *material = &fitting->material;
+    for (int c = 0; c < material->channels; c++) {
+        double total = 0, variance = 0;
+        for (int side = 0; side < ALB_SIDES; side++) {
+            const alb_measurement *measurement = &fitting->sides[side][c];
+            if (!measurement->measured)
+                continue;
+            const alb_outcome *outcome = &measurement->outcome;
+            total += outcome->fitted.total;
+            variance += outcome->fitted.total_sd * outcome->fitted.total_sd;
+            if (outcome->discrepancy_relative > 0)
+                alb_text_add(
+                    notes,
+                    "%s %s: no form fits within the noise. %s misses by %.2g %% relative, which is in the sd; the "
+                    "measured energy is kept.\n",
+                    alb_side_names[side], material->channel_names[c], alb_form_name(outcome->fitted.profile.form),
+                    100 * outcome->discrepancy_relative);
+            if (!outcome->fitted.identifiable)
+                alb_fail(failure, ALB_UNDECIDED, "%s %s: the data do not decide: %s; the best guess is written",
+                         alb_side_names[side], material->channel_names[c], outcome->undecided);
+        }
+        if (!(total > 1))
+            continue;
+        alb_text_add(notes,
+                     "%s: reflection and transmission together are %.4g of the incident flux, more than came in.\n",
+                     material->channel_names[c], total);
+        if (absolute && total > 1 + 3 * sqrt(variance))
+            alb_fail(
+                failure, ALB_UNDECIDED,
+                "%s: reflection and transmission together are %.4g +- %.2g of the incident flux, more than came in: "
+                "check the white reference's reflectance and the exposures; the best guess is written",
+                material->channel_names[c], total, sqrt(variance));
+    }
+}
+
+static bool fit_request(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes, const request *r,
+                        alb_error *error)
+{
+    if (r->session)
+        return alb_fitting_from_session(fitting, provenance, notes, r->session, error);
+    if (r->table) {
+        snprintf(provenance->options, sizeof provenance->options, "--table %s --side %s", alb_path_name(r->table),
+                 r->side);
+        return alb_fitting_from_table(
+            fitting, provenance, r->table,
+            strcmp(r->side, alb_side_names[ALB_REFLECTION]) == 0 ? ALB_REFLECTION : ALB_TRANSMISSION, error);
+    }
+    const char *const paths[ALB_SIDES] = {r->reflection, r->transmission};
+    snprintf(provenance->options, sizeof provenance->options, "%s%s%s%s --mm-per-pixel %.9g --spot-radius-mm %.9g",
+             r->reflection ? "--image " : "", r->reflection ? alb_path_name(r->reflection) : "",
+             r->transmission ? " --transmission " : "", r->transmission ? alb_path_name(r->transmission) : "",
+             r->mm_per_pixel, r->spot_radius_mm);
+    return alb_fitting_from_images(fitting, provenance, notes, paths, r->mm_per_pixel, r->spot_radius_mm, error);
+}
+
+static bool write_results(const alb_fitting *fitting, const alb_provenance *provenance, const alb_text *notes,
+                          const request *r, alb_error *error)
+{
+    if (!alb_file_make_directory(r->out, error) ||
+        !alb_fitting_report(fitting, notes->bytes ? notes->bytes : "", r->out, error) ||
+        !alb_material_write(fitting, provenance, r->out, error))
+        return false;
+    if (r->as_json) {
+        alb_json json;
+        alb_json_begin(&json, provenance);
+        alb_material_put(&json, fitting);
+        return alb_json_print(&json, error);
+    }
+    for (int side = 0; side < ALB_SIDES; side++)
+        for (int c = 0; c < fitting->material.channels; c++)
+            if (fitting->sides[side][c].measured)
+                print_outcome(fitting, (alb_side)side, c);
+    return true;
+}
+
+static bool run(int argc, char **argv, alb_error *error)
+{
+    request r = {0};
+    const char *pixel = NULL, *radius = NULL;
+    const alb_option options[] = {{NULL, "SESSION", false, &r.session, NULL},
+                                  {"--image", NULL, false, &r.reflection, NULL},
+                                  {"--transmission", NULL, false, &r.transmission, NULL},
+                                  {"--mm-per-pixel", NULL, false, &pixel, NULL},
+                                  {"--spot-radius-mm", NULL, false, &radius, NULL},
+                                  {"--table", NULL, false, &r.table, NULL},
+                                  {"--side", NULL, false, &r.side, NULL},
+                                  {"-o", NULL, false, &r.out, NULL},
+                                  {"--json", NULL, false, NULL, &r.as_json}};
+    if (!alb_options_read(options, sizeof options / sizeof options[0], argc, argv, error) ||
+        !check_request(&r, pixel, radius, error))
+        return false;
+    alb_provenance provenance = {.command = "fit"};
+    alb_text notes = {0};
+    alb_error failure = {0};
+    alb_fitting *fitting = alb_allocate(1, sizeof *fitting, error);
+    bool ok = fitting && fit_request(fitting, &provenance, &notes, &r, error);
+    if (ok) {
+        examine(fitting, r.session != NULL, &notes, &failure);
+        if (notes.bytes)
+            fputs(notes.bytes, stderr);
+        ok = write_results(fitting, &provenance, &notes, &r, error);
+    }
+    if (ok && failure.status != ALB_OK)
+        ok = alb_fail(error, failure.status, "%s", failure.text);
+    if (fitting)
+        alb_fitting_free(fitting);
+    free(fitting);
+    alb_text_free(&notes);
+    return ok;
+}
+
+const alb_command alb_fit_command = {"fit", "readings of a lit spot -> material (material.json)", usage, run};

@@ -1,0 +1,243 @@
+// material.json: written by fit, read strictly by render.
+#include "base/record.h"
+#include "fit/measurement.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+bool alb_fitting_run(alb_fitting *fitting, alb_side side, int channel, double relative_scale_sd, alb_error *error)
+{
+    alb_measurement *measurement = &fitting->sides[side][channel];
+    alb_error reason = {0};
+    measurement->measured =
+        alb_choose(&measurement->outcome, &measurement->readings, &measurement->forward, relative_scale_sd, &reason);
+    if (!measurement->measured)
+        return alb_fail(error, reason.status, "%s %s: %s", alb_side_names[side],
+                        fitting->material.channel_names[channel], reason.text);
+    fitting->material.fitted[side][channel] = measurement->outcome.fitted;
+    return true;
+}
+
+void alb_fitting_free(alb_fitting *fitting)
+{
+    for (int side = 0; side < ALB_SIDES; side++)
+        for (int channel = 0; channel < 3; channel++) {
+            alb_readings_free(&fitting->sides[side][channel].readings);
+            alb_operator_free(&fitting->sides[side][channel].forward);
+        }
+    *fitting = (alb_fitting){0};
+}
+
+static void put_attempts(alb_json *json, const alb_outcome *outcome)
+{
+    alb_json_list(json, "tried");
+    for (int i = 0; i < outcome->attempt_count; i++) {
+        const alb_attempt *attempt = &outcome->attempts[i];
+        alb_json_object(json, NULL);
+        alb_json_string(json, "form", alb_form_name(attempt->form));
+        alb_json_number(json, "chi_square", attempt->chi_square);
+        alb_json_integer(json, "degrees_of_freedom", attempt->degrees_of_freedom);
+        alb_json_number(json, "bic", attempt->bic);
+        alb_json_string(json, "rejected", attempt->rejected);
+        alb_json_end_object(json);
+    }
+    alb_json_end_list(json);
+}
+
+static void put_outcome(alb_json *json, const char *side, const alb_outcome *outcome)
+{
+    const alb_fitted *fitted = &outcome->fitted;
+    const int n = alb_form_parameter_count(fitted->profile.form);
+    alb_json_object(json, side);
+    alb_json_string(json, "form", alb_form_name(fitted->profile.form));
+    alb_json_boolean(json, "identifiable", fitted->identifiable);
+    if (!fitted->identifiable) {
+        alb_json_boolean(json, "best_guess", true);
+        alb_json_string(json, "undecided", outcome->undecided);
+    }
+    alb_json_object(json, "parameters");
+    for (int p = 0; p < n; p++)
+        alb_json_estimate(json, alb_form_parameter_name(fitted->profile.form, p), fitted->profile.parameters[p],
+                          fitted->sd[p]);
+    alb_json_end_object(json);
+    alb_json_list(json, "covariance");
+    for (int p = 0; p < n; p++)
+        alb_json_numbers(json, NULL, fitted->covariance[p], (size_t)n);
+    alb_json_end_list(json);
+    alb_json_estimate(json, "total", fitted->total, fitted->total_sd);
+    alb_json_number(json, "chi_square", fitted->chi_square);
+    alb_json_integer(json, "degrees_of_freedom", fitted->degrees_of_freedom);
+    alb_json_string(json, "errors_from",
+                    outcome->discrepancy_relative > 0
+                        ? "no form fits within the noise: relative discrepancy in quadrature with "
+                          "the noise, measured energy kept as a reading of its own"
+                        : "the noise alone");
+    alb_json_number(json, "discrepancy_relative", outcome->discrepancy_relative);
+    alb_json_number(json, "rms_relative", outcome->rms_relative);
+    alb_json_number(json, "measured_share_of_total", outcome->measured_share);
+    alb_json_object(json, "tail_slope_per_mm");
+    alb_json_number(json, "value", outcome->slope_per_mm);
+    alb_json_number(json, "sd", outcome->slope_sd);
+    alb_json_number(json, "from_mm", outcome->slope_from_mm);
+    alb_json_number(json, "to_mm", outcome->slope_to_mm);
+    alb_json_end_object(json);
+    put_attempts(json, outcome);
+    alb_json_end_object(json);
+}
+
+void alb_material_put(alb_json *json, const alb_fitting *fitting)
+{
+    const alb_material *material = &fitting->material;
+    alb_json_string(json, "name", material->name);
+    if (material->thickness_mm > 0)
+        alb_json_number(json, "thickness_mm", material->thickness_mm);
+    if (material->refractive_index > 0)
+        alb_json_number(json, "refractive_index", material->refractive_index);
+    alb_json_object(json, "channels");
+    for (int c = 0; c < material->channels; c++) {
+        alb_json_object(json, material->channel_names[c]);
+        for (int side = 0; side < ALB_SIDES; side++)
+            if (fitting->sides[side][c].measured)
+                put_outcome(json, alb_side_names[side], &fitting->sides[side][c].outcome);
+        alb_json_end_object(json);
+    }
+    alb_json_end_object(json);
+}
+
+bool alb_material_write(const alb_fitting *fitting, const alb_provenance *provenance, const char *folder,
+                        alb_error *error)
+{
+    char path[ALB_PATH_SIZE];
+    if (!alb_path_join(path, folder, "material.json", error))
+        return false;
+    alb_json json;
+    alb_json_begin(&json, provenance);
+    alb_material_put(&json, fitting);
+    return alb_json_write(&json, path, error);
+}
+
+// Parameters must keep S finite and positive everywhere.
+static bool check_profile(const alb_profile *profile, alb_node node, alb_error *error)
+{
+    const double *p = profile->parameters;
+    bool good = p[0] > 0 && p[1] > 0;
+    if (profile->form == ALB_FORM_TWO_EXPONENTIALS)
+        good &= p[2] >= 0 && p[3] > 0;
+    if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS)
+        good &= p[2] <= 0 && p[0] + p[2] >= -1e-12 * p[0] && p[3] > p[1];
+    if (profile->form == ALB_FORM_DIPOLE)
+        good = p[0] > 0 && p[1] > 0 && p[2] >= 1 && p[2] <= 3;
+    return good ||
+           alb_node_fail(error, node, "parameters", "not a positive profile that falls off: %s (%g, %g, %g, %g)",
+                         alb_form_name(profile->form), p[0], p[1], p[2], p[3]);
+}
+
+static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
+{
+    alb_profile *profile = &fitted->profile;
+    const int n = alb_form_parameter_count(profile->form);
+    alb_node parameters, one, rows;
+    size_t row_count;
+    char names[256] = "";
+    if (!alb_node_object(&parameters, node, "parameters", error))
+        return false;
+    for (int p = 0; p < n; p++) {
+        const char *name = alb_form_parameter_name(profile->form, p);
+        strncat(strncat(names, name, 60), " ", 2);
+        if (!alb_node_object(&one, parameters, name, error) || !alb_node_allow(one, "value sd", error) ||
+            !alb_node_number(&profile->parameters[p], one, "value", -1e300, 1e300, error) ||
+            (fitted->identifiable && !alb_node_number(&fitted->sd[p], one, "sd", 0, 1e300, error)))
+            return false;
+    }
+    if (!alb_node_allow(parameters, names, error) || !check_profile(profile, node, error))
+        return false;
+    if (!fitted->identifiable)
+        return true;
+    if (!alb_node_list(&rows, &row_count, node, "covariance", error))
+        return false;
+    if (row_count != (size_t)n)
+        return alb_node_fail(error, node, "covariance", "%zu rows for %d parameters", row_count, n);
+    for (size_t p = 0; p < row_count; p++)
+        for (size_t q = 0; q < row_count; q++)
+            if (!alb_node_item_number(&fitted->covariance[p][q], alb_node_item(rows, p), q, -1e300, 1e300, error))
+                return false;
+    return true;
+}
+
+static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
+{
+    const char *form;
+    long freedom;
+    alb_node total;
+    if (!alb_node_allow(
+            node,
+            "form identifiable best_guess undecided parameters covariance total chi_square degrees_of_freedom "
+            "errors_from discrepancy_relative rms_relative measured_share_of_total tail_slope_per_mm tried",
+            error) ||
+        !alb_node_text(&form, node, "form", error))
+        return false;
+    if (!alb_form_from_name(&fitted->profile.form, form))
+        return alb_node_fail(error, node, "form", "unknown form '%s'", form);
+    if (!alb_node_boolean(&fitted->identifiable, node, "identifiable", error) ||
+        !read_parameters(fitted, node, error) || !alb_node_object(&total, node, "total", error) ||
+        !alb_node_allow(total, "value sd", error) ||
+        !alb_node_number(&fitted->total, total, "value", 0, 1e300, error) ||
+        (fitted->identifiable && !alb_node_number(&fitted->total_sd, total, "sd", 0, 1e300, error)) ||
+        !alb_node_number(&fitted->chi_square, node, "chi_square", 0, 1e300, error) ||
+        !alb_node_integer(&freedom, node, "degrees_of_freedom", 0, 1000000000, error))
+        return false;
+    fitted->degrees_of_freedom = (int)freedom;
+    const double expected = alb_profile_total(&fitted->profile);
+    if (fabs(fitted->total - expected) > 1e-6 * expected)
+        return alb_node_fail(error, node, "total", "%g does not belong to the parameters, whose total is %g",
+                             fitted->total, expected);
+    return true;
+}
+
+static bool read_material(alb_material *material, const alb_record *record, alb_error *error)
+{
+    alb_node root, channels, channel, side_node;
+    const char *name;
+    if (!alb_record_root(&root, record, error) ||
+        !alb_node_allow(root, "format provenance name thickness_mm refractive_index channels", error) ||
+        !alb_node_text(&name, root, "name", error) || !alb_node_object(&channels, root, "channels", error))
+        return false;
+    if (strlen(name) >= ALB_NAME_SIZE)
+        return alb_node_fail(error, root, "name", "longer than %d characters", ALB_NAME_SIZE - 1);
+    snprintf(material->name, sizeof material->name, "%s", name);
+    if ((alb_node_has(root, "thickness_mm") &&
+         !alb_node_number(&material->thickness_mm, root, "thickness_mm", 0, 1e6, error)) ||
+        (alb_node_has(root, "refractive_index") &&
+         !alb_node_number(&material->refractive_index, root, "refractive_index", 1, 4, error)))
+        return false;
+    const size_t count = alb_node_key_count(channels);
+    if (count < 1 || count > 3)
+        return alb_node_fail(error, root, "channels", "%zu channels; 1 to 3 are possible", count);
+    material->channels = (int)count;
+    for (size_t c = 0; c < count; c++) {
+        const char *key = alb_node_key(channels, c);
+        if (strlen(key) >= sizeof material->channel_names[0])
+            return alb_node_fail(error, channels, key, "name longer than 7 characters");
+        snprintf(material->channel_names[c], sizeof material->channel_names[0], "%s", key);
+        if (!alb_node_object(&channel, channels, key, error) ||
+            !alb_node_allow(channel, "reflection transmission", error))
+            return false;
+        for (int side = 0; side < ALB_SIDES; side++)
+            if (alb_node_has(channel, alb_side_names[side]) &&
+                (!alb_node_object(&side_node, channel, alb_side_names[side], error) ||
+                 !read_fitted(&material->fitted[side][c], side_node, error)))
+                return false;
+    }
+    return true;
+}
+
+bool alb_material_read(alb_material *material, const char *path, alb_error *error)
+{
+    *material = (alb_material){0};
+    alb_record *record = alb_record_read(path, error);
+    const bool ok = record && read_material(material, record, error);
+    alb_record_free(record);
+    if (!ok)
+        *material = (alb_material){0};
+    return ok;
+}

@@ -1,0 +1,29 @@
+// Everything one fit made: per side and channel the readings, the forward model and the outcome, and the material.
+#pragma once
+#include "base/json.h"
+#include "fit/choose.h"
+
+typedef struct alb_measurement {
+    bool measured;
+    alb_readings readings;
+    alb_operator forward;
+    alb_outcome outcome;
+} alb_measurement;
+
+typedef struct alb_fitting {
+    alb_material
+        material; // name, thickness_mm, refractive_index, channels and their names; fitted is filled by alb_fitting_run
+    alb_measurement sides[ALB_SIDES][3];
+} alb_fitting;
+
+// Fits one side and channel whose readings and forward model are there.
+bool alb_fitting_run(alb_fitting *fitting, alb_side side, int channel, double relative_scale_sd, alb_error *error);
+void alb_fitting_free(alb_fitting *fitting);
+
+// Puts the content of material.json into an open object.
+void alb_material_put(alb_json *json, const alb_fitting *fitting);
+// folder/material.json
+bool alb_material_write(const alb_fitting *fitting, const alb_provenance *provenance, const char *folder,
+                        alb_error *error);
+// folder/report/fit.csv, fit.svg and fit.html. `notes` are sentences for the page, separated by line breaks.
+bool alb_fitting_report(const alb_fitting *fitting, const char *notes, const char *folder, alb_error *error);

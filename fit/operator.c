@@ -1,0 +1,160 @@
+// reading_i = mean over the ring's pixels p of integral S(|p - q|) e(q) dq,  e the spot's irradiance, integral 1.
+//
+// Both are averages over direction about the centre, so only distances count: a pixel at r and a spot sample at s are
+// rho = sqrt(r^2 + s^2 - 2 r s cos phi) apart, phi uniform in 0..pi. The mass of each rho is split linearly between the
+// two nearest points of a grid quadratic in its index (rho_k = rho_max (k / K)^2: fine where S is steep), so that S
+// enters at the grid points alone: an operator built once, whatever is fitted. Splitting linearly costs (b h)^2 / 8 of
+// e^(-b rho) at spacing h = 2 sqrt(rho rho_max) / K: below 1e-4 wherever b^2 rho rho_max < 2e-4 K^2 = 3200, K = 4000.
+//
+// Where it stops being true: e is taken as round about its centroid (its radial distribution is what is used); the
+// camera's footprint and blur must be the same in e as in the image; the slab is taken as endless and alike everywhere.
+#include "fit/operator.h"
+#include "base/memory.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { GRID = 4001, DIRECTIONS = 48 };
+
+typedef struct row {
+    double weight[GRID];
+    int first, last;
+} row;
+
+static double grid_at(int k, double end_mm) { return end_mm * ((double)k / (GRID - 1)) * ((double)k / (GRID - 1)); }
+
+static void add_mass(row *out, double rho_mm, double mass, double end_mm)
+{
+    int k = (int)(sqrt(rho_mm / end_mm) * (GRID - 1));
+    k = k < GRID - 2 ? k : GRID - 2;
+    const double low = grid_at(k, end_mm), high = grid_at(k + 1, end_mm);
+    const double upper = fmin(fmax((rho_mm - low) / (high - low), 0), 1);
+    out->weight[k] += mass * (1 - upper);
+    out->weight[k + 1] += mass * upper;
+    out->first = k < out->first ? k : out->first;
+    out->last = k + 1 > out->last ? k + 1 : out->last;
+}
+
+static void fill_row(row *out, const double *r_mm, const double *share, const alb_spot *spot, const double *cosine,
+                     double end_mm)
+{
+    *out = (row){.first = GRID, .last = -1};
+    for (int i = 0; i < ALB_RING_SAMPLES; i++)
+        for (int j = 0; share[i] > 0 && j < spot->count; j++) {
+            const double r = r_mm[i], s = spot->r_mm[j], mass = share[i] * spot->share[j];
+            if (s == 0) {
+                add_mass(out, r, mass, end_mm);
+                continue;
+            }
+            for (int k = 0; k < DIRECTIONS; k++) {
+                const double squared = r * r + s * s - 2 * r * s * cosine[k];
+                add_mass(out, sqrt(squared > 0 ? squared : 0), mass / DIRECTIONS, end_mm);
+            }
+        }
+}
+
+static bool allocate(alb_operator *forward, int rows, int grid, alb_error *error)
+{
+    *forward = (alb_operator){.row_count = rows, .grid_count = grid};
+    const size_t n = (size_t)rows;
+    return (forward->grid_mm = alb_allocate((size_t)grid, sizeof(double), error)) &&
+           (forward->first = alb_allocate(n, sizeof(int), error)) &&
+           (forward->last = alb_allocate(n, sizeof(int), error)) &&
+           (forward->offset = alb_allocate(n + 1, sizeof(size_t), error));
+}
+
+bool alb_operator_create(alb_operator *forward, const alb_readings *readings, const alb_spot *spot, alb_error *error)
+{
+    bool ok = false;
+    row *rows = NULL;
+    if (!allocate(forward, readings->count, GRID, error))
+        goto done;
+    rows = alb_allocate((size_t)readings->count, sizeof *rows, error);
+    if (!rows)
+        goto done;
+    double end_mm = 0, spot_mm = 0, cosine[DIRECTIONS];
+    for (int k = 0; k < DIRECTIONS; k++)
+        cosine[k] = cos(M_PI * (k + 0.5) / DIRECTIONS);
+    for (int i = 0; i < readings->count; i++)
+        for (int k = 0; k < ALB_RING_SAMPLES; k++)
+            end_mm = fmax(end_mm, readings->sample_r_mm[i][k]);
+    for (int j = 0; j < spot->count; j++)
+        spot_mm = fmax(spot_mm, spot->r_mm[j]);
+    end_mm = (end_mm + spot_mm) * (1 + 1e-9);
+    for (int k = 0; k < GRID; k++)
+        forward->grid_mm[k] = grid_at(k, end_mm);
+#pragma omp parallel for schedule(dynamic)
+    for (int i = 0; i < readings->count; i++)
+        fill_row(&rows[i], readings->sample_r_mm[i], readings->sample_share[i], spot, cosine, end_mm);
+    for (int i = 0; i < readings->count; i++) {
+        forward->first[i] = rows[i].first;
+        forward->last[i] = rows[i].last;
+        forward->offset[i + 1] = forward->offset[i] + (size_t)(rows[i].last - rows[i].first + 1);
+    }
+    forward->weight = alb_allocate(forward->offset[readings->count], sizeof(double), error);
+    if (!forward->weight)
+        goto done;
+    for (int i = 0; i < readings->count; i++)
+        memcpy(forward->weight + forward->offset[i], rows[i].weight + rows[i].first,
+               (forward->offset[i + 1] - forward->offset[i]) * sizeof(double));
+    ok = true;
+done:
+    free(rows);
+    if (!ok)
+        alb_operator_free(forward);
+    return ok;
+}
+
+bool alb_operator_identity(alb_operator *forward, const alb_readings *readings, alb_error *error)
+{
+    const int n = readings->count;
+    if (!allocate(forward, n, n, error) || !(forward->weight = alb_allocate((size_t)n, sizeof(double), error))) {
+        alb_operator_free(forward);
+        return false;
+    }
+    for (int i = 0; i < n; i++) {
+        forward->grid_mm[i] = readings->r_mm[i];
+        forward->first[i] = forward->last[i] = i;
+        forward->offset[i + 1] = (size_t)i + 1;
+        forward->weight[i] = 1;
+    }
+    return true;
+}
+
+void alb_operator_free(alb_operator *forward)
+{
+    free(forward->grid_mm);
+    free(forward->first);
+    free(forward->last);
+    free(forward->offset);
+    free(forward->weight);
+    *forward = (alb_operator){0};
+}
+
+void alb_operator_apply(double *out, const alb_operator *forward, const double *on_grid)
+{
+    for (int i = 0; i < forward->row_count; i++) {
+        const double *weight = forward->weight + forward->offset[i], *value = on_grid + forward->first[i];
+        const int n = forward->last[i] - forward->first[i] + 1;
+        double sum = 0;
+        for (int k = 0; k < n; k++)
+            sum += weight[k] * value[k];
+        out[i] = sum;
+    }
+}
+
+double *alb_operator_readings(const alb_operator *forward, const alb_profile *profile, alb_error *error)
+{
+    double *out = alb_allocate((size_t)forward->row_count, sizeof(double), error);
+    double *on_grid = alb_allocate((size_t)forward->grid_count, sizeof(double), error);
+    if (out && on_grid) {
+        for (int k = 0; k < forward->grid_count; k++)
+            on_grid[k] = alb_profile_value(profile, forward->grid_mm[k]);
+        alb_operator_apply(out, forward, on_grid);
+    } else {
+        free(out);
+        out = NULL;
+    }
+    free(on_grid);
+    return out;
+}

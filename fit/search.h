@@ -1,0 +1,35 @@
+// The best parameters of one form, from no start values.
+#pragma once
+#include "fit/operator.h"
+#include "fit/profile.h"
+
+// What a fit sees. Borrowed.
+typedef struct alb_weighing {
+    const alb_readings *readings;
+    const alb_operator *forward;
+    const double *sd; // of each reading
+    double energy_sd; // of sum value * area; 0: the energy is not a reading of its own
+} alb_weighing;
+
+// Readings of e^(-b r) on a grid of decays, computed once for all forms.
+typedef struct alb_basis {
+    int count;
+    double *decay_per_mm;
+    double *readings; // count x readings
+} alb_basis;
+
+bool alb_basis_create(alb_basis *basis, const alb_readings *readings, const alb_operator *forward, alb_error *error);
+void alb_basis_free(alb_basis *basis);
+
+// *found false where no second term of the wanted sign lowers chi-square (the form collapses to one exponential).
+// *chi_square is over the readings and, where it has an sd, the energy.
+bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_form form, const alb_basis *basis,
+                const alb_weighing *weighing, alb_error *error);
+// From the profile given to the nearest minimum.
+bool alb_search_polish(alb_profile *profile, double *chi_square, const alb_weighing *weighing, alb_error *error);
+// Inverse of J^T J in the form's own parameters; *full_rank false (and zeros) where the scaled matrix cannot be
+// inverted.
+bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX], bool *full_rank,
+                           const alb_profile *profile, const alb_weighing *weighing, alb_error *error);
+// sum value * area, of any readings.
+double alb_energy(const alb_readings *readings, const double *value);

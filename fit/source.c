@@ -1,0 +1,278 @@
+// From files to fitted sides.
+//
+// A session's products hold radiance per flux, L / Phi. The exitance is M = pi L for a face that leaves light as
+// Lambert says; real faces do within 5 % below 50 degrees and fall to 0.57 of it at 82 degrees, measured by Monte
+// Carlo, so that a camera further than 50 degrees off the normal is pointed out. The image of the spot on the white
+// reference serves both sides: it is the light that enters the front. Images given by hand keep their unit; what
+// saturates (integers at full scale) and what is not finite counts as not measured.
+#include "fit/source.h"
+#include "base/image.h"
+#include "base/memory.h"
+#include "calibrate/calibration.h"
+#include "fit/table.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+// One channel of an image as numbers that the observer takes, times `factor`.
+typedef struct plane {
+    double *value, *variance;
+} plane;
+
+static void plane_free(plane *out)
+{
+    free(out->value);
+    free(out->variance);
+    *out = (plane){0};
+}
+
+static bool plane_take(plane *out, const alb_image *image, const char *channel, double factor, double saturation,
+                       alb_error *error)
+{
+    char variance_name[ALB_CHANNEL_NAME + 16];
+    snprintf(variance_name, sizeof variance_name, "variance.%s", channel);
+    const int c = alb_image_channel(image, channel), v = alb_image_channel(image, variance_name);
+    const size_t count = (size_t)image->width * (size_t)image->height;
+    *out = (plane){.value = alb_allocate(count, sizeof(double), error)};
+    if (v >= 0)
+        out->variance = alb_allocate(count, sizeof(double), error);
+    if (!out->value || (v >= 0 && !out->variance)) {
+        plane_free(out);
+        return false;
+    }
+    for (size_t i = 0; i < count; i++) {
+        const float *pixel = image->pixels + i * (size_t)image->channels;
+        const double value = (double)pixel[c];
+        out->value[i] = isfinite(value) && value < saturation ? factor * value : (double)NAN;
+        if (v >= 0)
+            out->variance[i] = factor * factor * (double)pixel[v];
+    }
+    return true;
+}
+
+// Observes one channel of an image, builds the forward model and fits.
+static bool fit_plane(alb_fitting *fitting, alb_side side, int channel, const alb_face *face, const plane *pixels,
+                      const alb_spot *spot, double relative_scale_sd, alb_text *notes, alb_error *error)
+{
+    char name[64];
+    alb_measurement *measurement = &fitting->sides[side][channel];
+    snprintf(name, sizeof name, "%s %s", alb_side_names[side], fitting->material.channel_names[channel]);
+    const alb_channel observed = {face, pixels->value, pixels->variance, name};
+    if (!alb_observe(&measurement->readings, &observed, error) ||
+        !alb_operator_create(&measurement->forward, &measurement->readings, spot, error))
+        return false;
+    const alb_readings *readings = &measurement->readings;
+    if (readings->core_mm > 0)
+        alb_text_add(notes,
+                     "%s: pixels out to %.4g mm of the centre are not measured (saturated); the core is the form's.\n",
+                     name, readings->core_mm);
+    if (readings->outer_mm > readings->complete_mm)
+        alb_text_add(notes, "%s: rings beyond %.4g mm are cut by the border of the image.\n", name,
+                     readings->complete_mm);
+    return alb_fitting_run(fitting, side, channel, relative_scale_sd, error);
+}
+
+static bool read_product(alb_image *image, alb_provenance *provenance, const alb_calibration *calibration,
+                         const alb_product *product, alb_error *error)
+{
+    char path[ALB_PATH_SIZE];
+    if (!alb_calibration_image(path, calibration, product, error) || !alb_provenance_add(provenance, path, error) ||
+        !alb_image_read(image, NULL, path, error))
+        return false;
+    const alb_view *view = &calibration->views[product->side];
+    if (!view->known)
+        return alb_fail(error, ALB_BAD_DATA,
+                        "%s: where the camera stands is not known on this side (no board lay there)", path);
+    if (image->width != view->camera.lens.width || image->height != view->camera.lens.height)
+        return alb_fail(error, ALB_BAD_DATA, "%s: %d x %d pixels, but the calibrated camera has %d x %d", path,
+                        image->width, image->height, view->camera.lens.width, view->camera.lens.height);
+    for (int c = 0; c < calibration->channels; c++)
+        if (alb_image_channel(image, calibration->channel_names[c]) < 0)
+            return alb_fail(error, ALB_BAD_DATA, "%s: no channel %s", path, calibration->channel_names[c]);
+    return true;
+}
+
+// The spot on the white reference with the pattern of the slab's shot.
+static bool measure_spots(alb_spot spots[3], alb_provenance *provenance, const alb_calibration *calibration,
+                          const alb_pattern *pattern, alb_error *error)
+{
+    const alb_product *white = NULL;
+    for (int i = 0; i < calibration->product_count && !white; i++)
+        if (calibration->products[i].target == ALB_TARGET_WHITE &&
+            calibration->products[i].pattern.kind == ALB_PATTERN_SPOT &&
+            calibration->products[i].pattern.diameter_px == pattern->diameter_px)
+            white = &calibration->products[i];
+    if (!white)
+        return alb_fail(error, ALB_BAD_DATA, "%s: no shot of a spot of %g projector pixels on the white reference",
+                        calibration->folder, pattern->diameter_px);
+    alb_image image = {0};
+    alb_face face = {0};
+    bool ok = read_product(&image, provenance, calibration, white, error) &&
+              alb_face_seen(&face, &calibration->views[white->side].camera, error);
+    for (int c = 0; ok && c < calibration->channels; c++) {
+        char name[ALB_NAME_SIZE + 16];
+        plane pixels = {0};
+        snprintf(name, sizeof name, "%s %s", white->shot, calibration->channel_names[c]);
+        ok = plane_take(&pixels, &image, calibration->channel_names[c], 1, INFINITY, error);
+        const alb_channel channel = {&face, pixels.value, pixels.variance, name};
+        ok = ok && alb_spot_measure(&spots[c], &channel, error);
+        plane_free(&pixels);
+    }
+    alb_face_free(&face);
+    alb_image_free(&image);
+    return ok;
+}
+
+static void note_view(alb_text *notes, const alb_calibration *calibration, alb_side side)
+{
+    const alb_transform world_from_camera = alb_inverse(&calibration->views[side].camera.camera_from_world);
+    const alb_vector eye = world_from_camera.translation;
+    const double angle_deg = acos(fabs(eye.z) / alb_length(eye)) * 180 / M_PI;
+    if (angle_deg > 50)
+        alb_text_add(
+            notes,
+            "%s: the camera looks %.0f degrees off the normal; beyond 50 a face leaves less than Lambert's law says, "
+            "and the profile comes out too low.\n",
+            alb_side_names[side], angle_deg);
+}
+
+static bool fit_product(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
+                        const alb_calibration *calibration, const alb_product *product, alb_error *error)
+{
+    alb_image image = {0};
+    alb_face face = {0};
+    alb_spot spots[3] = {{0}};
+    note_view(notes, calibration, product->side);
+    bool ok = read_product(&image, provenance, calibration, product, error) &&
+              alb_face_seen(&face, &calibration->views[product->side].camera, error) &&
+              measure_spots(spots, provenance, calibration, &product->pattern, error);
+    for (int c = 0; ok && c < calibration->channels; c++) {
+        plane pixels = {0};
+        ok = plane_take(&pixels, &image, calibration->channel_names[c], M_PI, INFINITY, error) &&
+             fit_plane(fitting, product->side, c, &face, &pixels, &spots[c], product->relative_scale_sd[c], notes,
+                       error);
+        plane_free(&pixels);
+    }
+    for (int c = 0; c < 3; c++)
+        alb_spot_free(&spots[c]);
+    alb_face_free(&face);
+    alb_image_free(&image);
+    return ok;
+}
+
+// Every slab spot of a calibrated session.
+static bool fit_products(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
+                         const alb_calibration *calibration, alb_error *error)
+{
+    bool taken[ALB_SIDES] = {false};
+    for (int i = 0; i < calibration->product_count; i++) {
+        const alb_product *product = &calibration->products[i];
+        if (product->target != ALB_TARGET_SLAB || product->pattern.kind != ALB_PATTERN_SPOT)
+            continue;
+        if (taken[product->side])
+            return alb_fail(error, ALB_BAD_DATA,
+                            "%s: more than one shot of a spot on the slab in %s; a material has one",
+                            calibration->folder, alb_side_names[product->side]);
+        taken[product->side] = true;
+        if (!fit_product(fitting, provenance, notes, calibration, product, error))
+            return false;
+    }
+    return taken[ALB_REFLECTION] || taken[ALB_TRANSMISSION] ||
+           alb_fail(error, ALB_BAD_DATA, "%s: no shot of a spot on the slab", calibration->folder);
+}
+
+bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes, const char *folder,
+                              alb_error *error)
+{
+    char path[ALB_PATH_SIZE];
+    alb_material *material = &fitting->material;
+    alb_calibration *calibration = alb_allocate(1, sizeof *calibration, error);
+    bool ok = calibration && alb_path_join(path, folder, "calibration.json", error) &&
+              alb_calibration_read(calibration, folder, error) && alb_provenance_add(provenance, path, error);
+    if (ok) {
+        memcpy(material->name, calibration->sample, sizeof material->name);
+        material->thickness_mm = calibration->thickness_mm;
+        material->refractive_index = calibration->refractive_index;
+        material->channels = calibration->channels;
+        memcpy(material->channel_names, calibration->channel_names, sizeof material->channel_names);
+        ok = fit_products(fitting, provenance, notes, calibration, error);
+    }
+    free(calibration);
+    return ok;
+}
+
+// The channels to fit of an image: those of R, G, B that are there, else Y.
+static bool take_channels(alb_material *material, const alb_image *image, const char *path, alb_error *error)
+{
+    static const char *const names[] = {"R", "G", "B", "Y"};
+    alb_material found = {0};
+    for (int i = 0; i < 4; i++)
+        if (alb_image_channel(image, names[i]) >= 0 && (i < 3 || found.channels == 0))
+            snprintf(found.channel_names[found.channels++], sizeof found.channel_names[0], "%s", names[i]);
+    if (found.channels == 0)
+        return alb_fail(error, ALB_BAD_DATA, "%s: none of the channels R, G, B, Y", path);
+    if (material->channels && (material->channels != found.channels ||
+                               memcmp(material->channel_names, found.channel_names, sizeof found.channel_names) != 0))
+        return alb_fail(error, ALB_BAD_DATA, "%s: other channels than the image of the other side", path);
+    material->channels = found.channels;
+    memcpy(material->channel_names, found.channel_names, sizeof found.channel_names);
+    return true;
+}
+
+static bool fit_image(alb_fitting *fitting, alb_text *notes, const char *path, alb_side side, double mm_per_pixel,
+                      const alb_spot *spot, alb_error *error)
+{
+    alb_image image = {0};
+    alb_face face = {0};
+    int bits = 0;
+    bool ok = alb_image_read(&image, &bits, path, error) && take_channels(&fitting->material, &image, path, error) &&
+              alb_face_flat(&face, image.width, image.height, mm_per_pixel, error);
+    const double saturation = bits == 8 ? 255 : bits == 16 ? 65535 : (double)INFINITY;
+    if (ok && bits)
+        alb_text_add(notes, "%s: %d-bit values are taken as linear; those at full scale as not measured.\n",
+                     alb_path_name(path), bits);
+    for (int c = 0; ok && c < fitting->material.channels; c++) {
+        plane pixels = {0};
+        ok = plane_take(&pixels, &image, fitting->material.channel_names[c], 1, saturation, error) &&
+             fit_plane(fitting, side, c, &face, &pixels, spot, 0, notes, error);
+        plane_free(&pixels);
+    }
+    alb_face_free(&face);
+    alb_image_free(&image);
+    return ok;
+}
+
+// "folder/wax.exr" names the material "wax".
+static void name_after(alb_material *material, const char *path)
+{
+    const char *name = alb_path_name(path), *dot = strrchr(name, '.');
+    const int length = dot && dot > name ? (int)(dot - name) : (int)strlen(name);
+    snprintf(material->name, sizeof material->name, "%.*s", length < ALB_NAME_SIZE ? length : ALB_NAME_SIZE - 1, name);
+}
+
+bool alb_fitting_from_images(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
+                             const char *const paths[ALB_SIDES], double mm_per_pixel, double spot_radius_mm,
+                             alb_error *error)
+{
+    alb_spot spot = {0};
+    bool ok = alb_spot_disc(&spot, spot_radius_mm, error);
+    name_after(&fitting->material, paths[ALB_REFLECTION] ? paths[ALB_REFLECTION] : paths[ALB_TRANSMISSION]);
+    for (int side = 0; ok && side < ALB_SIDES; side++)
+        ok = !paths[side] || (alb_provenance_add(provenance, paths[side], error) &&
+                              fit_image(fitting, notes, paths[side], (alb_side)side, mm_per_pixel, &spot, error));
+    alb_spot_free(&spot);
+    return ok;
+}
+
+bool alb_fitting_from_table(alb_fitting *fitting, alb_provenance *provenance, const char *path, alb_side side,
+                            alb_error *error)
+{
+    alb_measurement *measurement = &fitting->sides[side][0];
+    name_after(&fitting->material, path);
+    fitting->material.channels = 1;
+    snprintf(fitting->material.channel_names[0], sizeof fitting->material.channel_names[0], "Y");
+    return alb_table_read(&measurement->readings, path, error) && alb_provenance_add(provenance, path, error) &&
+           alb_operator_identity(&measurement->forward, &measurement->readings, error) &&
+           alb_fitting_run(fitting, side, 0, 0, error);
+}

@@ -1,0 +1,14 @@
+// Where readings come from: a calibrated session, images, a table. Each fills the material's name and channels and fits
+// every side and channel it finds; adds what it read to the inputs, and sentences for the reader to the notes.
+#pragma once
+#include "base/text.h"
+#include "fit/measurement.h"
+
+bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes, const char *folder,
+                              alb_error *error);
+// paths[side] may be NULL, not both. spot_radius_mm 0: a pencil beam.
+bool alb_fitting_from_images(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
+                             const char *const paths[ALB_SIDES], double mm_per_pixel, double spot_radius_mm,
+                             alb_error *error);
+bool alb_fitting_from_table(alb_fitting *fitting, alb_provenance *provenance, const char *path, alb_side side,
+                            alb_error *error);

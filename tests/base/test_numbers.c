@@ -1,0 +1,142 @@
+// Random numbers, statistics and the camera.
+#include "base/camera.h"
+#include "base/random.h"
+#include "base/statistics.h"
+#include "check.h"
+
+// Mean and variance of n draws against theory, in units of their own standard error.
+static void check_moments(double (*draw)(alb_random *, double), double parameter, double mean, double variance,
+                          double fourth, int stream)
+{
+    const int n = 200000;
+    double sum = 0, squares = 0;
+    for (int i = 0; i < n; i++) {
+        alb_random random = alb_random_at(7, (uint64_t)stream, (uint64_t)i);
+        const double d = draw(&random, parameter) - mean;
+        sum += d;
+        squares += d * d;
+    }
+    check_below(fabs(sum / n) / sqrt(variance / n), 4);
+    check_below(fabs(squares / n - variance) / sqrt((fourth - variance * variance) / n), 4);
+}
+
+static double uniform(alb_random *random, double parameter)
+{
+    (void)parameter;
+    return alb_random_uniform(random);
+}
+static double normal(alb_random *random, double parameter)
+{
+    (void)parameter;
+    return alb_random_normal(random);
+}
+
+static void random_moments(void **state)
+{
+    (void)state;
+    check_moments(uniform, 0, 0.5, 1.0 / 12, 1.0 / 80, 1);
+    check_moments(normal, 0, 0, 1, 3, 2);
+    const double means[] = {0.01, 0.7, 5, 29.9, 30.1, 1000, 1e6};
+    for (int i = 0; i < 7; i++) // the fourth central moment of a Poisson variate is m (1 + 3 m)
+        check_moments(alb_random_poisson, means[i], means[i], means[i], means[i] * (1 + 3 * means[i]), 3 + i);
+    alb_random random = alb_random_at(1, 2, 3);
+    assert_true(alb_random_poisson(&random, 0) == 0);
+}
+
+// Chi-square of a histogram of Poisson counts against the exact probabilities, on both sides of the change of method.
+static void poisson_distribution(void **state)
+{
+    (void)state;
+    const double means[] = {3, 40};
+    for (int k = 0; k < 2; k++) {
+        const double m = means[k];
+        double seen[128] = {0}, chi_square = 0;
+        const int n = 200000;
+        int bins = 0;
+        for (int i = 0; i < n; i++) {
+            alb_random random = alb_random_at(9, (uint64_t)k, (uint64_t)i);
+            const double d = alb_random_poisson(&random, m);
+            seen[d < 127 ? (int)d : 127]++;
+        }
+        for (int i = 0; i < 127; i++) {
+            const double expected = n * exp(-m + i * log(m) - lgamma(i + 1));
+            if (expected < 10)
+                continue;
+            chi_square += (seen[i] - expected) * (seen[i] - expected) / expected;
+            bins++;
+        }
+        assert_true(alb_chi_square_tail(chi_square, bins - 1) > 1e-4);
+    }
+}
+
+static void chi_square_values(void **state)
+{
+    (void)state;
+    check_near(alb_chi_square_tail(3.841458820694124, 1), 0.05, 1e-12); // tables
+    check_near(alb_chi_square_tail(9.210340371976182, 2), 0.01, 1e-12); // exp(-x/2)
+    check_relative(alb_chi_square_tail(200, 2), exp(-100), 1e-12);
+    check_near(alb_chi_square_tail(100, 100), 0.4811916, 1e-6);
+    assert_true(alb_chi_square_tail(0, 5) == 1 && isnan(alb_chi_square_tail(1, 0)));
+    double values[] = {5, 1, 4, 2};
+    check_near(alb_median(values, 4), 3, 0);
+    const double terms[] = {1, 1e100, 1, -1e100};
+    check_near(alb_sum(terms, 4), 2, 0);
+}
+
+static void camera_inverts_its_distortion(void **state)
+{
+    (void)state;
+    const alb_lens lenses[] = {
+        {640, 480, 536.06, 536.01, 342.37, 235.53, -0.2651, -0.0466, 0.0018, -0.0003, 0.2521}, // strong barrel
+        {640, 480, 900, 905, 319.5, 239.5, 0.1, -0.05, 0, 0, 0},
+    };
+    for (int l = 0; l < 2; l++) {
+        alb_camera camera =
+            alb_camera_look_at((alb_vector){30, -80, 200}, (alb_vector){1, 2, 0}, (alb_vector){0, 1, 0}, 40, 640, 480);
+        camera.lens = lenses[l];
+        for (int v = 0; v < 480; v += 17)
+            for (int u = 0; u < 640; u += 17) {
+                alb_vector o, d;
+                double u2, v2;
+                assert_true(alb_camera_ray(&o, &d, &camera, u, v));
+                assert_true(alb_camera_project(&u2, &v2, &camera, alb_add(o, alb_times(150, d))));
+                check_near(u2, u, 1e-8);
+                check_near(v2, v, 1e-8);
+            }
+    }
+    // Where the polynomial has turned over there is no direction.
+    const alb_lens turned = {640, 480, 200, 200, 320, 240, -0.5, 0, 0, 0, 0};
+    alb_vector d;
+    assert_false(alb_lens_direction(&d, &turned, 0, 0));
+}
+
+// The areas of all pixels on the plane add up to the area of the picture's outline there.
+static void pixel_areas_add_up(void **state)
+{
+    (void)state;
+    const alb_camera camera =
+        alb_camera_look_at((alb_vector){40, 10, 120}, (alb_vector){0, 0, 0}, (alb_vector){0, 1, 0}, 25, 160, 120);
+    double sum = 0, x[4], y[4], shoelace = 0;
+    for (int v = 0; v < 120; v++)
+        for (int u = 0; u < 160; u++) {
+            double px, py, area;
+            assert_true(alb_camera_on_plane(&px, &py, &area, &camera, 0, u, v));
+            sum += area;
+        }
+    const double corners[4][2] = {{-0.5, -0.5}, {159.5, -0.5}, {159.5, 119.5}, {-0.5, 119.5}};
+    for (int i = 0; i < 4; i++)
+        assert_true(alb_camera_on_plane(&x[i], &y[i], NULL, &camera, 0, corners[i][0], corners[i][1]));
+    for (int i = 0; i < 4; i++)
+        shoelace += (x[i] * y[(i + 1) % 4] - x[(i + 1) % 4] * y[i]) / 2;
+    check_relative(sum, fabs(shoelace), 1e-5); // the pixel's quadrilateral is taken to second order in its size
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(random_moments),     cmocka_unit_test(poisson_distribution),
+        cmocka_unit_test(chi_square_values),  cmocka_unit_test(camera_inverts_its_distortion),
+        cmocka_unit_test(pixel_areas_add_up),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
