@@ -41,7 +41,7 @@ alb_record *alb_record_parse(const char *name, const char *bytes, size_t size, a
         goto failed;
     }
     json_error_t problem;
-    record->top = json_loadb(bytes, size, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY, &problem);
+    record->top = json_loadb(bytes, size, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY | JSON_ALLOW_NUL, &problem);
     if (!record->top) {
         alb_fail(error, ALB_BAD_DATA, "%s:%d:%d: not valid JSON: %s", name, problem.line > 0 ? problem.line : 1,
                  problem.column > 0 ? problem.column : 1, problem.text);
@@ -305,6 +305,8 @@ bool alb_node_text(const char **out, alb_node object, const char *key, alb_error
         return false;
     if (!json_is_string(value))
         return alb_node_fail(error, object, key, "expected text, found %s", type_name(value));
+    if (strlen(json_string_value(value)) != json_string_length(value))
+        return alb_node_fail(error, object, key, "text with a NUL character");
     *out = json_string_value(value);
     return true;
 }
@@ -364,7 +366,7 @@ bool alb_node_item_number(double *out, alb_node list, size_t i, double minimum, 
 bool alb_node_item_text(const char **out, alb_node list, size_t i, alb_error *error)
 {
     const json_t *value = json_array_get(list.value, i);
-    if (!json_is_string(value))
+    if (!json_is_string(value) || strlen(json_string_value(value)) != json_string_length(value))
         return item_fail(error, list, i, "expected text");
     *out = json_string_value(value);
     return true;
