@@ -1,0 +1,225 @@
+// alabaster render: scene in, picture out.
+#include "base/command.h"
+#include "base/exr.h"
+#include "base/memory.h"
+#include "base/progress.h"
+#include "render/solution.h"
+#include "render/view.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct outputs {
+    const char *scene, *picture, *mesh, *png;
+    bool json;
+} outputs;
+
+// --png, or the picture's path with .png for its ending.
+static bool png_path(char path[ALB_PATH_SIZE], const outputs *out, alb_error *error)
+{
+    const size_t length = strlen(out->picture),
+                 stem = length >= 4 && !strcmp(out->picture + length - 4, ".exr") ? length - 4 : length;
+    const char *name = alb_path_name(out->picture);
+    const int written = out->png ? snprintf(path, ALB_PATH_SIZE, "%s", out->png)
+                                 : snprintf(path, ALB_PATH_SIZE, "%.*s.png", (int)stem, out->picture);
+    if (written >= ALB_PATH_SIZE)
+        return alb_fail(error, ALB_USAGE, "%s: the path is too long", name);
+    return true;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+// Exposure that shows the 99th percentile of the lit pixels' largest channel at 0.9.
+static bool auto_exposure(double *exposure, const alb_image *picture, alb_error *error)
+{
+    const size_t pixels = (size_t)picture->width * (size_t)picture->height;
+    float *values = alb_allocate(pixels, sizeof *values, error);
+    size_t count = 0;
+    if (!values)
+        return false;
+    for (size_t i = 0; i < pixels; i++) {
+        const float *p = picture->pixels + 3 * i, value = fmaxf(p[0], fmaxf(p[1], p[2]));
+        if (value > 0)
+            values[count++] = value;
+    }
+    qsort(values, count, sizeof *values, by_size);
+    *exposure = count ? 0.9 / (double)values[(size_t)(0.99 * (double)(count - 1))] : 1;
+    free(values);
+    return true;
+}
+
+static bool write_mesh(const char *path, const alb_solution *solution, const alb_provenance *provenance,
+                       alb_error *error)
+{
+    const size_t n = solution->patches.count;
+    char comment[256];
+    float(*rgb)[3] = alb_allocate(n, sizeof *rgb, error);
+    if (!rgb)
+        return false;
+    for (size_t p = 0; p < n; p++)
+        for (int c = 0; c < 3; c++)
+            rgb[p][c] = (float)solution->radiosity[p][c];
+    snprintf(comment, sizeof comment, "alabaster render: radiosity per face; scene sha256 %s",
+             provenance->inputs[0].sha256);
+    const bool ok = alb_mesh_write_ply(solution->patches.mesh, (const float(*)[3])rgb, comment, path, error);
+    free(rgb);
+    return ok;
+}
+
+static bool write_picture(const outputs *out, const alb_image *picture, const alb_provenance *provenance,
+                          double *exposure, alb_error *error)
+{
+    char png[ALB_PATH_SIZE];
+    alb_json json;
+    alb_json_begin(&json, provenance);
+    alb_json_end_object(&json);
+    const bool ok = (!json.text.failed || alb_fail(error, ALB_NO_MEMORY, "out of memory for the provenance")) &&
+                    png_path(png, out, error) && auto_exposure(exposure, picture, error) &&
+                    alb_exr_write(picture, json.text.bytes, out->picture, error) &&
+                    alb_image_write_png(picture, *exposure, png, error);
+    alb_json_free(&json);
+    return ok;
+}
+
+static void warn(const alb_scene *scene, const alb_solution *s)
+{
+    size_t open = 0, bent = 0;
+    if (scene->mesh.dropped)
+        fprintf(stderr, "render: %zu faces left out: no area, or there twice\n", scene->mesh.dropped);
+    if (s->factors.back_rays)
+        fprintf(stderr,
+                "render: %.2f %% of the rays between patches meet the back of a patch, which is black; is a mesh open "
+                "or turned?\n",
+                100.0 * (double)s->factors.back_rays / ((double)s->patches.count * s->factors.rays));
+    for (size_t b = 0; b < s->scatter.body_count; b++) {
+        open += !s->scatter.bodies[b].closed;
+        bent += s->scatter.bodies[b].closed && !s->scatter.bodies[b].convex;
+    }
+    if (open)
+        fprintf(stderr,
+                "render: %zu translucent bodies are not closed; light paths inside them are taken as straight\n", open);
+    if (bent)
+        fprintf(
+            stderr,
+            "render: %zu translucent bodies are not convex; straight paths through the hollows are too short there\n",
+            bent);
+    if (s->column_sum > 1)
+        fprintf(stderr, "render: the mesh is coarse for its scattering: a patch gives back %.4f of its flux\n",
+                s->column_sum);
+}
+
+static bool print_json(const alb_scene *scene, const alb_solution *s, double view_s, double exposure, alb_error *error)
+{
+    alb_json json;
+    double imbalance[3];
+    const alb_balance *b = &s->balance;
+    for (int c = 0; c < 3; c++)
+        imbalance[c] = b->in[c] > 0 ? (b->in[c] - b->absorbed[c] - b->escaped[c] - b->lost[c]) / b->in[c] : 0;
+    alb_json_begin(&json, NULL);
+    alb_json_integer(&json, "patches", (long)s->patches.count);
+    alb_json_integer(&json, "dropped_faces", (long)scene->mesh.dropped);
+    alb_json_integer(&json, "rays_per_patch", s->factors.rays);
+    alb_json_integer(&json, "iterations", s->report.iterations);
+    alb_json_number(&json, "residual", s->report.residual);
+    alb_json_number(&json, "largest_row_sum", s->row_sum);
+    alb_json_number(&json, "largest_column_sum", s->column_sum);
+    alb_json_object(&json, "flux");
+    alb_json_numbers(&json, "in", b->in, 3);
+    alb_json_numbers(&json, "absorbed", b->absorbed, 3);
+    alb_json_numbers(&json, "escaped", b->escaped, 3);
+    alb_json_numbers(&json, "lost_on_backs", b->lost, 3);
+    alb_json_numbers(&json, "relative_imbalance", imbalance, 3);
+    alb_json_end_object(&json);
+    alb_json_object(&json, "seconds");
+    for (int i = 0; i < ALB_STAGES; i++)
+        alb_json_number(&json, alb_stage_names[i], s->seconds[i]);
+    alb_json_number(&json, "view", view_s);
+    alb_json_end_object(&json);
+    alb_json_object(&json, "bytes");
+    for (int i = 0; i < ALB_STAGES; i++)
+        alb_json_integer(&json, alb_stage_names[i], (long)s->bytes[i]);
+    alb_json_end_object(&json);
+    alb_json_number(&json, "png_exposure", exposure);
+    return alb_json_print(&json, error);
+}
+
+static bool report(const outputs *out, const alb_scene *scene, const alb_solution *s, double view_s, double exposure,
+                   alb_error *error)
+{
+    double total_s = view_s;
+    for (int i = 0; i < ALB_STAGES; i++)
+        total_s += s->seconds[i];
+    if (out->json)
+        return print_json(scene, s, view_s, exposure, error);
+    printf("%s: %zu patches, %d products to residual %.1e, largest row sum %.4f, %.1f s\n", out->picture,
+           s->patches.count, s->report.iterations, s->report.residual, s->row_sum, total_s);
+    return true;
+}
+
+static bool render(const outputs *out, alb_scene *scene, alb_provenance *provenance, alb_error *error)
+{
+    alb_solution solution = {0};
+    alb_image picture = {0};
+    float(*corners)[3][3] = NULL;
+    double exposure = 1;
+    bool ok = false;
+    if (!alb_solution_create(&solution, scene, error) ||
+        !(corners = alb_allocate(solution.patches.count, sizeof *corners, error)))
+        goto done;
+    warn(scene, &solution);
+    const double start_s = alb_clock_s();
+    if (!alb_view_smooth(corners, &solution.patches, (const double(*)[3])solution.radiosity, error) ||
+        !alb_view_render(&picture, scene, &solution.tracer, (const float(*)[3][3])corners, error))
+        goto done;
+    const double view_s = alb_clock_s() - start_s;
+    ok = write_picture(out, &picture, provenance, &exposure, error) &&
+         (!out->mesh || write_mesh(out->mesh, &solution, provenance, error)) &&
+         report(out, scene, &solution, view_s, exposure, error);
+done:
+    free(corners);
+    alb_image_free(&picture);
+    alb_solution_free(&solution);
+    return ok;
+}
+
+static bool run(int argc, char **argv, alb_error *error)
+{
+    outputs out = {0};
+    const alb_option options[] = {
+        {.label = "SCENE.json", .required = true, .value = &out.scene},
+        {.name = "-o", .required = true, .value = &out.picture},
+        {.name = "--mesh", .value = &out.mesh},
+        {.name = "--png", .value = &out.png},
+        {.name = "--json", .flag = &out.json},
+    };
+    alb_scene scene = {0};
+    alb_provenance provenance = {.command = "render"};
+    if (!alb_options_read(options, sizeof options / sizeof *options, argc, argv, error) ||
+        !alb_scene_read(&scene, &provenance, out.scene, error))
+        return false;
+    snprintf(provenance.options, sizeof provenance.options, "rays_per_patch %d, residual %g, seed %llu",
+             scene.rays_per_patch, scene.residual, (unsigned long long)scene.seed);
+    const bool ok = render(&out, &scene, &provenance, error);
+    alb_scene_free(&scene);
+    return ok;
+}
+
+const alb_command alb_render_command = {
+    .name = "render",
+    .summary = "render a scene of translucent and opaque meshes",
+    .usage =
+        "alabaster render SCENE.json -o PICTURE.exr [--png PICTURE.png] [--mesh OUT.ply] [--json]\n"
+        "\n"
+        "Solves B = (I - S F)^-1 (S E + M) on the scene's meshes and writes linear radiance as EXR and, beside it,\n"
+        "a PNG whose exposure shows the brightest hundredth at 0.9.\n"
+        "  -o PICTURE.exr     the picture: channels R, G, B\n"
+        "  --png PICTURE.png  where the PNG goes instead of PICTURE.png\n"
+        "  --mesh OUT.ply     the mesh with the radiosity of each face (red, green, blue, float)\n"
+        "  --json             patches, products, residual, row sums, balance of flux, seconds and bytes per stage\n"
+        "The scene file is described in render/scene.h.\n",
+    .run = run,
+};

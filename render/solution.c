@@ -1,0 +1,126 @@
+// The order of the steps, timed. Balance, H = E + F B the whole irradiance, kappa the column sums of S':
+//     in = sum A (E + M),  absorbed = sum A (1 - kappa) H,  escaped = sum A B (share of sky rays), lost likewise for
+//     backs
+#include "render/solution.h"
+#include "base/memory.h"
+#include "base/progress.h"
+#include <stdlib.h>
+#include <string.h>
+
+const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "lights", "scattering", "solve"};
+
+static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    const size_t n = s->patches.count;
+    if (!(s->irradiance = alb_allocate(n, sizeof *s->irradiance, error)) ||
+        !(s->exitance = alb_allocate(n, sizeof *s->exitance, error)) ||
+        !(s->radiosity = alb_allocate(n, sizeof *s->radiosity, error)))
+        return false;
+    for (size_t p = 0; p < n; p++)
+        memcpy(s->exitance[p], scene->surfaces[scene->mesh.groups[p]].exitance, sizeof s->exitance[p]);
+    for (size_t i = 0; i < scene->light_count; i++)
+        if (!alb_light_add(s->irradiance, &scene->lights[i], &s->patches, &s->tracer, &s->factors, scene->seed,
+                           UINT64_MAX - i, error))
+            return false;
+    s->bytes[ALB_STAGE_LIGHTS] = 3 * n * sizeof *s->radiosity;
+    return true;
+}
+
+static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, error))
+        return false;
+    s->bytes[ALB_STAGE_SCATTERING] = alb_scatter_bytes(&s->scatter);
+    const bool closed = !s->factors.sky_rays && !s->factors.back_rays;
+    return alb_radiosity_check(&s->row_sum, &s->scatter, closed, scene->mesh.groups, scene->surfaces, error);
+}
+
+static bool take_balance(alb_solution *s, alb_error *error)
+{
+    const size_t n = s->patches.count, rays = (size_t)s->factors.rays;
+    double(*gathered)[3] = alb_allocate(n, sizeof *gathered, error), (*kept)[3] = alb_allocate(n, sizeof *kept, error);
+    const bool ok = gathered && kept;
+    if (ok) {
+        alb_form_factors_apply(gathered, &s->factors, (const double(*)[3])s->radiosity);
+        alb_scatter_column_sums(kept, &s->scatter, &s->patches);
+    }
+    for (size_t p = 0; ok && p < n; p++) {
+        size_t sky = 0, back = 0;
+        for (size_t q = 0; q < rays; q++) {
+            sky += s->factors.hits[p * rays + q] == n;
+            back += s->factors.hits[p * rays + q] == n + 1;
+        }
+        for (int c = 0; c < 3; c++) {
+            const double area = s->patches.areas_mm2[p], irradiance = s->irradiance[p][c] + gathered[p][c];
+            s->column_sum = fmax(s->column_sum, kept[p][c]);
+            s->balance.in[c] += area * (s->irradiance[p][c] + s->exitance[p][c]);
+            s->balance.absorbed[c] += area * (1 - kept[p][c]) * irradiance;
+            s->balance.escaped[c] += area * s->radiosity[p][c] * (double)sky / (double)rays;
+            s->balance.lost[c] += area * s->radiosity[p][c] * (double)back / (double)rays;
+        }
+    }
+    free(gathered);
+    free(kept);
+    return ok;
+}
+
+static bool solve(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    s->bytes[ALB_STAGE_SOLVE] = 23 * s->patches.count * sizeof *s->radiosity;
+    return alb_radiosity_solve(s->radiosity, &s->report, (const double(*)[3])s->irradiance,
+                               (const double(*)[3])s->exitance, &s->scatter, &s->factors, s->patches.areas_mm2,
+                               scene->residual, error) &&
+           take_balance(s, error);
+}
+
+static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, alb_error *error)
+{
+    switch (stage) {
+    case ALB_STAGE_TRACER:
+        if (!alb_patches_create(&s->patches, &scene->mesh, error) ||
+            !alb_tracer_create(&s->tracer, &scene->mesh, error))
+            return false;
+        s->bytes[stage] = (size_t)s->tracer.bytes;
+        return true;
+    case ALB_STAGE_FORM_FACTORS:
+        s->bytes[stage] = s->patches.count * (size_t)scene->rays_per_patch * sizeof(uint32_t);
+        return alb_form_factors_create(&s->factors, &s->patches, &s->tracer, scene->rays_per_patch, scene->seed,
+                                       ALB_SAMPLING_LATTICE, error);
+    case ALB_STAGE_LIGHTS:
+        return light_patches(s, scene, error);
+    case ALB_STAGE_SCATTERING:
+        return scatter_patches(s, scene, error);
+    default:
+        return solve(s, scene, error);
+    }
+}
+
+bool alb_solution_create(alb_solution *solution, const alb_scene *scene, alb_error *error)
+{
+    *solution = (alb_solution){0};
+    alb_progress progress;
+    alb_progress_begin(&progress, "render", ALB_STAGES);
+    bool ok = true;
+    for (int stage = 0; ok && stage < ALB_STAGES; stage++) {
+        const double start_s = alb_clock_s();
+        ok = run_stage(solution, (alb_stage)stage, scene, error);
+        solution->seconds[stage] = alb_clock_s() - start_s;
+        alb_progress_at(&progress, stage + 1);
+    }
+    alb_progress_end(&progress);
+    if (!ok)
+        alb_solution_free(solution);
+    return ok;
+}
+
+void alb_solution_free(alb_solution *solution)
+{
+    alb_patches_free(&solution->patches);
+    alb_tracer_free(&solution->tracer);
+    alb_form_factors_free(&solution->factors);
+    alb_scatter_free(&solution->scatter);
+    free(solution->irradiance);
+    free(solution->exitance);
+    free(solution->radiosity);
+    *solution = (alb_solution){0};
+}
