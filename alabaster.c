@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#pragma weak alb_capture_command
 #pragma weak alb_calibrate_command
 #pragma weak alb_fit_command
 #pragma weak alb_render_command
