@@ -1,14 +1,14 @@
 // The virtual rig: a projector, a slab and a camera that exist in TRUTH.json. Photons scatter in the slab (photon.c),
-// the projector's pattern makes a face shine (kernel.c, face.c), the camera sees it (view.c) and the sensor counts it
-// (sensor.c). The radiance of a shot is worked out once and shared by its exposures and repeats.
+// the projector's pattern makes a face shine (kernel.c, lit_face.c), the camera sees it (view.c) and the sensor counts
+// it (sensor.c). The radiance of a shot is worked out once and shared by its exposures and repeats.
 //
 // What is simpler than the world: the face sheds light evenly in all directions, the slab is wider than the view, light
 // from the camera's side does not exist, nothing is out of focus, and the camera stands in the same way before both
 // faces.
 #include "base/memory.h"
 #include "base/progress.h"
-#include "capture/face.h"
 #include "capture/kernel.h"
+#include "capture/lit_face.h"
 #include "capture/rig.h"
 #include "capture/sensor.h"
 #include "capture/view.h"
@@ -122,11 +122,11 @@ static bool check_shots(const virtual_rig *rig, const alb_plan *plan, alb_error 
     board_half(half, plan);
     for (int i = 0; i < plan->shot_count; i++) {
         const alb_shot *shot = &plan->shots[i];
-        alb_face face;
+        alb_lit_face face;
         alb_transform pose;
-        if (!alb_face_create(&face, &rig->truth, &shot->pattern, NULL, plan->white_reflectance, error))
+        if (!alb_lit_face_create(&face, &rig->truth, &shot->pattern, NULL, plan->white_reflectance, error))
             return false;
-        alb_face_free(&face);
+        alb_lit_face_free(&face);
         if (shot->target == ALB_TARGET_BOARD && !shot->in_hand &&
             !alb_sight_sees(&rig->sight, &rig->sight.camera.camera_from_world, half[0], half[1]))
             return alb_fail(error, ALB_BAD_DATA,
@@ -199,7 +199,7 @@ static bool picture(alb_image *out, const virtual_rig *rig, const alb_plan *plan
                     alb_error *error)
 {
     alb_transform camera_from_plane = rig->sight.camera.camera_from_world;
-    alb_face face = {0};
+    alb_lit_face face = {0};
     printed_board board = {.square_mm = plan->board_square_mm, .white = rig->truth.lamp_radiance};
     alb_flat_scene scene = {.samples = 2};
     board_half(board.half, plan);
@@ -214,12 +214,12 @@ static bool picture(alb_image *out, const virtual_rig *rig, const alb_plan *plan
         scene = (alb_flat_scene){lamp_radiance, &rig->truth.lamp_radiance, 1};
     } else {
         const alb_kernel *kernels = shot->target == ALB_TARGET_SLAB ? rig->kernels[shot->side] : NULL;
-        if (!alb_face_create(&face, &rig->truth, &shot->pattern, kernels, plan->white_reflectance, error))
+        if (!alb_lit_face_create(&face, &rig->truth, &shot->pattern, kernels, plan->white_reflectance, error))
             return false;
-        scene = (alb_flat_scene){alb_face_radiance, &face, 2};
+        scene = (alb_flat_scene){alb_lit_face_radiance, &face, 2};
     }
     alb_sight_picture(out, &rig->sight, &camera_from_plane, &scene);
-    alb_face_free(&face);
+    alb_lit_face_free(&face);
     return true;
 }
 

@@ -5,7 +5,7 @@
 //
 // The face is taken as ground, shedding light evenly in all directions (L = M / pi), and the slab as wider than the
 // view. Not true for polished faces, near the slab's edges, or where the pattern's grid of discs stands off the middle.
-#include "capture/face.h"
+#include "capture/lit_face.h"
 #include "base/memory.h"
 #include <math.h>
 #include <stdlib.h>
@@ -20,7 +20,7 @@ static bool inside(const alb_pattern *pattern, int x, int y, int half)
 }
 
 // Lists a disc's pixels and the points inside them.
-static bool fill_disc(alb_face *face, const alb_pattern *pattern, alb_error *error)
+static bool fill_disc(alb_lit_face *face, const alb_pattern *pattern, alb_error *error)
 {
     const int half = (int)ceil(pattern->diameter_px / 2), n = (int)ceil(face->pixel_mm / (0.8 * face->blur_sd_mm));
     const double p = face->pixel_mm;
@@ -53,13 +53,13 @@ static bool fill_disc(alb_face *face, const alb_pattern *pattern, alb_error *err
     return true;
 }
 
-bool alb_face_create(alb_face *face, const alb_truth *truth, const alb_pattern *pattern, const alb_kernel *kernels,
-                     const double white_reflectance[3], alb_error *error)
+bool alb_lit_face_create(alb_lit_face *face, const alb_truth *truth, const alb_pattern *pattern,
+                         const alb_kernel *kernels, const double white_reflectance[3], alb_error *error)
 {
-    *face = (alb_face){.kind = pattern->kind,
-                       .kernels = kernels,
-                       .pixel_mm = truth->projector.pixel_mm,
-                       .blur_sd_mm = truth->projector.blur_sd_mm};
+    *face = (alb_lit_face){.kind = pattern->kind,
+                           .kernels = kernels,
+                           .pixel_mm = truth->projector.pixel_mm,
+                           .blur_sd_mm = truth->projector.blur_sd_mm};
     for (int c = 0; c < 3; c++) {
         face->reflectance[c] = white_reflectance[c];
         face->irradiance[c] = truth->projector.irradiance_w_per_mm2[c];
@@ -71,7 +71,7 @@ bool alb_face_create(alb_face *face, const alb_truth *truth, const alb_pattern *
     face->disc_count = columns * rows;
     face->disc = alb_allocate((size_t)face->disc_count, sizeof *face->disc, error);
     if (!face->disc || !fill_disc(face, pattern, error)) {
-        alb_face_free(face);
+        alb_lit_face_free(face);
         return false;
     }
     for (int i = 0; i < face->disc_count; i++) {
@@ -81,15 +81,15 @@ bool alb_face_create(alb_face *face, const alb_truth *truth, const alb_pattern *
     return true;
 }
 
-void alb_face_free(alb_face *face)
+void alb_lit_face_free(alb_lit_face *face)
 {
     free(face->disc);
     free(face->pixel);
     free(face->point);
-    *face = (alb_face){0};
+    *face = (alb_lit_face){0};
 }
 
-double alb_face_irradiance(const alb_face *face, double x_mm, double y_mm)
+double alb_lit_face_irradiance(const alb_lit_face *face, double x_mm, double y_mm)
 {
     if (face->kind == ALB_PATTERN_WHITE)
         return 1;
@@ -110,7 +110,7 @@ double alb_face_irradiance(const alb_face *face, double x_mm, double y_mm)
 }
 
 // Exitance per irradiance of a white pixel.
-static void exitance(double out[3], const alb_face *face, double x_mm, double y_mm)
+static void exitance(double out[3], const alb_lit_face *face, double x_mm, double y_mm)
 {
     double sum[3] = {0, 0, 0};
     for (int i = 0; i < face->disc_count; i++)
@@ -121,19 +121,19 @@ static void exitance(double out[3], const alb_face *face, double x_mm, double y_
             for (int c = 0; c < 3; c++)
                 sum[c] += alb_kernel_value(&face->kernels[c], r);
         }
-    const double e = alb_face_irradiance(face, x_mm, y_mm);
+    const double e = alb_lit_face_irradiance(face, x_mm, y_mm);
     for (int c = 0; c < 3; c++)
         out[c] = face->kind == ALB_PATTERN_WHITE ? face->kernels[c].total
                                                  : sum[c] * face->point_mm2 + face->kernels[c].unscattered * e;
 }
 
-void alb_face_radiance(double out[3], const void *scene, double x_mm, double y_mm)
+void alb_lit_face_radiance(double out[3], const void *scene, double x_mm, double y_mm)
 {
-    const alb_face *face = scene;
+    const alb_lit_face *face = scene;
     if (face->kernels) {
         exitance(out, face, x_mm, y_mm);
     } else {
-        const double e = alb_face_irradiance(face, x_mm, y_mm);
+        const double e = alb_lit_face_irradiance(face, x_mm, y_mm);
         for (int c = 0; c < 3; c++)
             out[c] = face->reflectance[c] * e;
     }
