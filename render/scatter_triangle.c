@@ -3,20 +3,24 @@
 //     integral S(|x - p|) dA = sum over edges  sign(d) integral [P(sqrt(h^2 + rho^2)) - P(h)] dtheta,
 //     rho(theta) = |d| / cos(theta),    P(x) = integral_0^x S(r) r dr
 // d is the signed distance of the foot from the edge's line, theta runs along the edge from the perpendicular. The
-// theta integrals are smooth and taken by Gauss-Legendre, eight points on each side of the perpendicular: 1e-6 of the
-// whole for triangles of aspect up to 10. Holds for p anywhere, inside, outside or above.
+// theta integrals are smooth and taken by Gauss-Legendre, eight points a panel, split at the perpendicular: within
+// 5e-5 of the profile's total for triangles of any shape (worst: p close to the line of an edge, narrow profile). Holds for p anywhere, inside, outside or above.
 #include "render/scatter.h"
 
 static const double nodes[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
 static const double shares[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763};
 
-static void add_arc(double integral[3], const alb_profile profiles[3], const double at_foot[3], double height2,
-                    double d, double from, double to)
+// Panels of at most a quarter turn: near pairs mostly need one.
+static void add_arc(double integral[3], const alb_profile profiles[3], const double at_foot[3], double height2, double d,
+                    double from, double to)
 {
-    const double middle = 0.5 * (from + to), half = 0.5 * (to - from);
-    for (int k = 0; k < 8; k++) {
-        const double theta = middle + (k < 4 ? -half : half) * nodes[k % 4];
-        const double rho = d / cos(theta), weight = half * shares[k % 4];
+    const int panels = (int)ceil((to - from) / (M_PI / 4));
+    const double half = 0.5 * (to - from) / panels;
+    for (int k = 0; k < 8 * panels; k++) {
+        const int node = k % 8;
+        const double middle = from + (2 * (k / 8) + 1) * half;
+        const double theta = middle + (node < 4 ? -half : half) * nodes[node % 4];
+        const double rho = d / cos(theta), weight = half * shares[node % 4];
         const double distance = sqrt(height2 + rho * rho);
         for (int c = 0; c < 3; c++)
             integral[c] += weight * (alb_profile_disc(&profiles[c], distance) - at_foot[c]);
