@@ -121,7 +121,7 @@ static void move_to_centroid(double *x, double *y, const alb_channel *channel, d
 }
 
 typedef struct bin {
-    double count, sum, squares, variance;
+    double count, sum, variance; // variance: summed over the pixels
 } bin;
 
 // Mean profile in rings one pixel wide about (x, y); returns how many of them stand above a fiftieth of the highest.
@@ -139,7 +139,6 @@ static int profile_about(bin bins[BINS], const alb_channel *channel, double x_mm
         bin *b = &bins[(int)r];
         b->count++;
         b->sum += value;
-        b->squares += value * value;
         b->variance += channel->variance && isfinite(channel->variance[i]) ? channel->variance[i] : 0;
     }
     double top = background;
@@ -157,6 +156,39 @@ static int profile_about(bin bins[BINS], const alb_channel *channel, double x_mm
     return used < BINS - 1 ? used : BINS - 2;
 }
 
+// A pixel against the mean profile, which is taken as straight between the middles of the rings.
+typedef struct comparison {
+    int bin;
+    double residual, slope_per_mm, cosine, sine;
+} comparison;
+
+static bool compare(comparison *out, const bin *bins, int used, const alb_channel *channel, size_t i, double x_mm,
+                    double y_mm, double pitch_mm)
+{
+    const double x = channel->face->x_mm[i] - x_mm, y = channel->face->y_mm[i] - y_mm, r = hypot(x, y);
+    const double value = channel->value[i], t = fmax(r / pitch_mm - 0.5, 0);
+    if (!(r < used * pitch_mm) || !isfinite(value) || r == 0)
+        return false;
+    const int k = (int)t;
+    if (!(bins[k].count > 0 && bins[k + 1].count > 0))
+        return false;
+    const double low = bins[k].sum / bins[k].count, step = bins[k + 1].sum / bins[k + 1].count - low;
+    *out = (comparison){k, value - (low + (t - k) * step), step / pitch_mm, x / r, y / r};
+    return true;
+}
+
+// Where the pixels have no variances: the scatter about the profile.
+static void scatter_about(bin bins[BINS], int used, const alb_channel *channel, double x_mm, double y_mm,
+                          double pitch_mm)
+{
+    const size_t count = (size_t)channel->face->width * (size_t)channel->face->height;
+    for (size_t i = 0; i < count; i++) {
+        comparison c;
+        if (compare(&c, bins, used, channel, i, x_mm, y_mm, pitch_mm))
+            bins[c.bin].variance += c.residual * c.residual;
+    }
+}
+
 // One Gauss-Newton step; false where the equations do not determine it.
 static bool shift_of(double *dx_mm, double *dy_mm, const bin *bins, int used, const alb_channel *channel, double x_mm,
                      double y_mm, double pitch_mm)
@@ -164,23 +196,17 @@ static bool shift_of(double *dx_mm, double *dy_mm, const bin *bins, int used, co
     const size_t count = (size_t)channel->face->width * (size_t)channel->face->height;
     double xx = 0, xy = 0, yy = 0, hx = 0, hy = 0;
     for (size_t i = 0; i < count; i++) {
-        const double px = channel->face->x_mm[i] - x_mm, py = channel->face->y_mm[i] - y_mm, r = hypot(px, py);
-        const double value = channel->value[i], t = fmax(r / pitch_mm - 0.5, 0);
-        const int k = (int)fmin(t, BINS);
-        if (!(r < used * pitch_mm) || !isfinite(value) || r == 0 || !(bins[k].count > 0 && bins[k + 1].count > 0))
+        comparison c;
+        if (!compare(&c, bins, used, channel, i, x_mm, y_mm, pitch_mm))
             continue;
-        const double low = bins[k].sum / bins[k].count, slope = bins[k + 1].sum / bins[k + 1].count - low;
-        const double ring_variance =
-            channel->variance ? bins[k].variance / bins[k].count : bins[k].squares / bins[k].count - low * low;
-        const double floor = 1e-12 * (low * low + slope * slope), weight = 1 / (fmax(ring_variance, 0) + floor);
-        const double residual = value - (low + (t - k) * slope), g = -slope / pitch_mm;
+        const bin *b = &bins[c.bin];
+        const double low = b->sum / b->count, step = c.slope_per_mm * pitch_mm;
+        const double weight = 1 / (b->variance / b->count + 1e-12 * (low * low + step * step));
         if (!(isfinite(weight) && weight > 0))
             continue;
-        xx += weight * g * g * px * px / (r * r);
-        xy += weight * g * g * px * py / (r * r);
-        yy += weight * g * g * py * py / (r * r);
-        hx += weight * g * residual * px / r;
-        hy += weight * g * residual * py / r;
+        const double gx = -c.slope_per_mm * c.cosine, gy = -c.slope_per_mm * c.sine;
+        xx += weight * gx * gx, xy += weight * gx * gy, yy += weight * gy * gy;
+        hx += weight * gx * c.residual, hy += weight * gy * c.residual;
     }
     const double determinant = xx * yy - xy * xy;
     if (!(determinant > 1e-9 * xx * yy))
@@ -199,6 +225,8 @@ static bool refine(double *x_mm, double *y_mm, const alb_channel *channel, doubl
     for (int iteration = 0; iteration < ITERATIONS; iteration++) {
         const int used = profile_about(bins, channel, *x_mm, *y_mm, pitch_mm, background);
         double dx, dy;
+        if (!channel->variance)
+            scatter_about(bins, used, channel, *x_mm, *y_mm, pitch_mm);
         if (!shift_of(&dx, &dy, bins, used, channel, *x_mm, *y_mm, pitch_mm))
             break;
         const double length = hypot(dx, dy), most = 3 * pitch_mm, share = length > most ? most / length : 1;
@@ -245,7 +273,7 @@ bool alb_centre_find(double *x_mm, double *y_mm, double *pitch_mm, const alb_cha
     if (!refine(x_mm, y_mm, channel, *pitch_mm, image.median, error))
         return false;
     if (!isfinite(*x_mm + *y_mm) || hypot(*x_mm - face->x_mm[i], *y_mm - face->y_mm[i]) > 50 * *pitch_mm)
-        return alb_fail(error, ALB_BAD_DATA, "%s: the spot has no centre: it is not alike all around pixel (%d, %d)",
-                        channel->name, x, y);
+        return alb_fail(error, ALB_BAD_DATA, "%s: no spot: it is not alike all around pixel (%d, %d)", channel->name, x,
+                        y);
     return true;
 }

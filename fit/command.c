@@ -92,9 +92,10 @@ static void examine(alb_fitting *fitting, bool absolute, alb_text *notes, alb_er
         }
         if (!(total > 1))
             continue;
-        alb_text_add(notes,
-                     "%s: reflection and transmission together are %.4g of the incident flux, more than came in.\n",
-                     material->channel_names[c], total);
+        if (!absolute)
+            alb_text_add(
+                notes, "%s: the total of the sides is %.4g, more than 1: in units of the incident flux it cannot be.\n",
+                material->channel_names[c], total);
         if (absolute && total > 1 + 3 * sqrt(variance))
             alb_fail(
                 failure, ALB_UNDECIDED,
@@ -117,10 +118,10 @@ static bool fit_request(alb_fitting *fitting, alb_provenance *provenance, alb_te
             strcmp(r->side, alb_side_names[ALB_REFLECTION]) == 0 ? ALB_REFLECTION : ALB_TRANSMISSION, error);
     }
     const char *const paths[ALB_SIDES] = {r->reflection, r->transmission};
-    snprintf(provenance->options, sizeof provenance->options, "%s%s%s%s --mm-per-pixel %.9g --spot-radius-mm %.9g",
-             r->reflection ? "--image " : "", r->reflection ? alb_path_name(r->reflection) : "",
-             r->transmission ? " --transmission " : "", r->transmission ? alb_path_name(r->transmission) : "",
-             r->mm_per_pixel, r->spot_radius_mm);
+    snprintf(provenance->options, sizeof provenance->options, "--mm-per-pixel %.9g --spot-radius-mm %.9g%s%s%s%s",
+             r->mm_per_pixel, r->spot_radius_mm, r->reflection ? " --image " : "",
+             r->reflection ? alb_path_name(r->reflection) : "", r->transmission ? " --transmission " : "",
+             r->transmission ? alb_path_name(r->transmission) : "");
     return alb_fitting_from_images(fitting, provenance, notes, paths, r->mm_per_pixel, r->spot_radius_mm, error);
 }
 

@@ -83,8 +83,10 @@ static double dipole_disc(const double *parameters, double rho_mm)
     const dipole d = dipole_of(parameters);
     double sum = 0;
     for (int i = 0; i < 2; i++) {
-        const double z = d.depth_mm[i], distance = hypot(rho_mm, z);
-        sum += exp(-d.transport_per_mm * z) - z / distance * exp(-d.transport_per_mm * distance);
+        // e^(-sigma z) - (z/d) e^(-sigma d), written so that small discs keep their digits
+        const double z = d.depth_mm[i], distance = hypot(rho_mm, z), further = rho_mm * rho_mm / (distance + z);
+        const double u = further / distance, lost = -expm1(-d.transport_per_mm * further);
+        sum += exp(-d.transport_per_mm * z) * (u + (1 - u) * lost);
     }
     return d.weight * sum;
 }
