@@ -1,23 +1,27 @@
 // The exact integral of a radial profile over a triangle, as a sum over its edges (Gauss's theorem in polar coordinates
-// about the foot of p on the triangle's plane, h the height of p):
+// about the foot of p on the triangle's plane, h the height of p, d the signed distance of the foot from an edge's
+// line):
 //     integral S(|x - p|) dA = sum over edges  sign(d) integral [P(sqrt(h^2 + rho^2)) - P(h)] dtheta,
-//     rho(theta) = |d| / cos(theta),    P(x) = integral_0^x S(r) r dr
-// d is the signed distance of the foot from the edge's line, theta runs along the edge from the perpendicular. The
-// theta integrals are smooth and taken by Gauss-Legendre, eight points on each side of the perpendicular: 1e-6 of the
-// whole for triangles of aspect up to 10. Holds for p anywhere, inside, outside or above.
+//     P(x) = integral_0^x S(r) r dr
+// Along an edge, at s from the perpendicular, s = |d| sinh w: rho = |d| cosh w, dtheta = dw / cosh w. In w the profile
+// turns over within a step of about one, however narrow it is and however close the foot lies to the edge, so that
+// Gauss-Legendre with eight points on panels of at most 1.5 holds for triangles of any shape. For p anywhere: inside,
+// outside or above.
 #include "render/scatter.h"
 
 static const double nodes[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
 static const double shares[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763};
 
-static void add_arc(double integral[3], const alb_profile profiles[3], const double at_foot[3], double height2,
-                    double d, double from, double to)
+static void add_edge(double integral[3], const alb_profile profiles[3], const double at_foot[3], double height2,
+                     double signed_d, double from, double to)
 {
-    const double middle = 0.5 * (from + to), half = 0.5 * (to - from);
-    for (int k = 0; k < 8; k++) {
-        const double theta = middle + (k < 4 ? -half : half) * nodes[k % 4];
-        const double rho = d / cos(theta), weight = half * shares[k % 4];
-        const double distance = sqrt(height2 + rho * rho);
+    const int panels = (int)ceil((to - from) / 1.5);
+    const double half = 0.5 * (to - from) / panels, d = fabs(signed_d);
+    for (int k = 0; k < 8 * panels; k++) {
+        const int node = k % 8;
+        const double w = from + (2 * (k / 8) + 1) * half + (node < 4 ? -half : half) * nodes[node % 4];
+        const double stretch = cosh(w), weight = copysign(half * shares[node % 4] / stretch, signed_d);
+        const double distance = sqrt(height2 + d * d * stretch * stretch);
         for (int c = 0; c < 3; c++)
             integral[c] += weight * (alb_profile_disc(&profiles[c], distance) - at_foot[c]);
     }
@@ -37,16 +41,8 @@ void alb_scatter_triangle(double integral[3], const alb_profile profiles[3], con
         const alb_vector a = alb_sub(triangle[k], foot), b = alb_sub(triangle[(k + 1) % 3], foot);
         const alb_vector along = alb_unit(alb_sub(b, a));
         const double signed_d = alb_dot(alb_cross(along, normal), a), d = fabs(signed_d);
-        const double from = atan2(alb_dot(along, a), d), to = atan2(alb_dot(along, b), d);
-        if (d == 0)
-            continue;
-        double edge[3] = {0};
-        if (from < 0 && to > 0) {
-            add_arc(edge, profiles, at_foot, height * height, d, from, 0);
-            add_arc(edge, profiles, at_foot, height * height, d, 0, to);
-        } else
-            add_arc(edge, profiles, at_foot, height * height, d, from, to);
-        for (int c = 0; c < 3; c++)
-            integral[c] += copysign(1, signed_d) * edge[c];
+        if (d > 1e-12 * alb_length(alb_sub(b, a))) // else seen edge-on: no angle
+            add_edge(integral, profiles, at_foot, height * height, signed_d, asinh(alb_dot(along, a) / d),
+                     asinh(alb_dot(along, b) / d));
     }
 }
