@@ -16,7 +16,7 @@ typedef struct alb_sight {
 typedef struct alb_flat_scene {
     void (*radiance)(double out[3], const void *scene, double x_mm, double y_mm);
     const void *scene;
-    int samples; // per pixel and direction
+    int samples; // per pixel, a Fibonacci number: 1; 5 for smooth scenes, 34 for edges
 } alb_flat_scene;
 
 // ALB_BAD_DATA where the distortion cannot be undone within the picture or the camera does not see the plane.

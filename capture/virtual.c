@@ -201,7 +201,7 @@ static bool picture(alb_image *out, const virtual_rig *rig, const alb_plan *plan
     alb_transform camera_from_plane = rig->sight.camera.camera_from_world;
     alb_lit_face face = {0};
     printed_board board = {.square_mm = plan->board_square_mm, .white = rig->truth.lamp_radiance};
-    alb_flat_scene scene = {.samples = 2};
+    alb_flat_scene scene = {.samples = 5};
     board_half(board.half, plan);
     if (shot->target == ALB_TARGET_CAP)
         return true;
@@ -209,14 +209,14 @@ static bool picture(alb_image *out, const virtual_rig *rig, const alb_plan *plan
         if (shot->in_hand && !alb_sight_hand_pose(&camera_from_plane, &rig->sight, board.half[0], board.half[1],
                                                   rig->truth.seed, (uint64_t)pose, error))
             return false;
-        scene = (alb_flat_scene){board_radiance, &board, 4};
+        scene = (alb_flat_scene){board_radiance, &board, 34};
     } else if (shot->target == ALB_TARGET_DIFFUSER) {
         scene = (alb_flat_scene){lamp_radiance, &rig->truth.lamp_radiance, 1};
     } else {
         const alb_kernel *kernels = shot->target == ALB_TARGET_SLAB ? rig->kernels[shot->side] : NULL;
         if (!alb_lit_face_create(&face, &rig->truth, &shot->pattern, kernels, plan->white_reflectance, error))
             return false;
-        scene = (alb_flat_scene){alb_lit_face_radiance, &face, 2};
+        scene = (alb_flat_scene){alb_lit_face_radiance, &face, 5};
     }
     alb_sight_picture(out, &rig->sight, &camera_from_plane, &scene);
     alb_lit_face_free(&face);

@@ -92,6 +92,57 @@ static void stated_kernel_blurred(void **state)
     alb_kernel_free(&kernel);
 }
 
+// At the middle, k(0) = a (1 - sqrt(pi/2) t e^(t^2/2) erfc(t/sqrt 2)), t = b s; and blur moves light, but loses none.
+static void stated_kernel_near_the_middle(void **state)
+{
+    (void)state;
+    const double sd = 0.12, a = 30, b[] = {3, 20};
+    for (int i = 0; i < 2; i++) {
+        const alb_stated_profile profile = {1, {a}, {b[i]}};
+        const double t = b[i] * sd;
+        alb_kernel kernel;
+        alb_error error = {0};
+        check_ok(alb_kernel_from_profile(&kernel, &profile, sd, 8, &error), &error);
+        check_relative(kernel.value_per_mm2[0], a * (1 - sqrt(pi / 2) * t * exp(t * t / 2) * erfc(t / sqrt(2))),
+                       2e-3); // rings of s/16 at their mean radius
+        double sum = 2 * pi * kernel.value_per_mm2[0] * kernel.step_mm * kernel.step_mm / 12; // Euler-Maclaurin
+        for (int j = 0; j < kernel.count; j++)
+            sum += kernel.value_per_mm2[j] * 2 * pi * j * kernel.step_mm * kernel.step_mm;
+        check_relative(sum, kernel.total, 1e-6); // the polynomials of I0 are right to 2e-7
+        alb_kernel_free(&kernel);
+    }
+}
+
+// A straight edge along the pixels moves evenly: the share of light in a column follows its place to 1/34.
+static double edge_mm;
+
+static void edge(double out[3], const void *scene, double x, double y)
+{
+    (void)scene, (void)y;
+    out[0] = out[1] = out[2] = x < edge_mm;
+}
+
+static void edges_are_fine(void **state)
+{
+    (void)state;
+    alb_truth truth = rig();
+    alb_sight sight;
+    alb_image picture = {0};
+    alb_error error = {0};
+    memset(truth.camera.distortion, 0, sizeof truth.camera.distortion);
+    truth.camera.tilt_deg = 0;
+    check_ok(alb_sight_open(&sight, &truth, &error), &error);
+    check_ok(alb_image_create(&picture, 320, 240, "R,G,B", &error), &error);
+    for (int i = 0; i < 10; i++) {
+        edge_mm = (7.5 + 0.1 * i) * 120 / 700; // 0.1 i into pixel 161 + 8
+        const alb_flat_scene scene = {edge, NULL, 34};
+        alb_sight_picture(&picture, &sight, &sight.camera.camera_from_world, &scene);
+        check_near((double)alb_image_at(&picture, 169, 100)[0], 0.1 * i, 0.5 / 34 + 1e-6);
+    }
+    alb_image_free(&picture);
+    alb_sight_free(&sight);
+}
+
 // The photograph of the lit reference has its centre of light where the camera model puts the origin, and the second
 // moment of the disc along x: p^2 (that of the pixels' middles + 1/12) + blur^2.
 static void spot_in_the_picture(void **state)
@@ -105,7 +156,7 @@ static void spot_in_the_picture(void **state)
     check_ok(alb_sight_open(&sight, &truth, &error), &error);
     check_ok(alb_lit_face_create(&face, &truth, &spot, NULL, white, &error), &error);
     check_ok(alb_image_create(&picture, 320, 240, "R,G,B", &error), &error);
-    const alb_flat_scene scene = {alb_lit_face_radiance, &face, 4};
+    const alb_flat_scene scene = {alb_lit_face_radiance, &face, 34};
     alb_sight_picture(&picture, &sight, &sight.camera.camera_from_world, &scene);
     double sum = 0, sx = 0, sy = 0, sxx = 0;
     for (int y = 0; y < 240; y++)
@@ -142,7 +193,7 @@ static void lens_is_the_lens(void **state)
     alb_error error = {0};
     check_ok(alb_sight_open(&sight, &truth, &error), &error);
     check_ok(alb_image_create(&picture, 320, 240, "R,G,B", &error), &error);
-    const alb_flat_scene scene = {ramp, NULL, 2};
+    const alb_flat_scene scene = {ramp, NULL, 5};
     alb_sight_picture(&picture, &sight, &sight.camera.camera_from_world, &scene);
     for (int y = 0; y < 240; y += 17)
         for (int x = 0; x < 320; x += 13) {
@@ -201,6 +252,8 @@ int main(void)
         cmocka_unit_test(white_reference_energy),
         cmocka_unit_test(traced_energy),
         cmocka_unit_test(stated_kernel_blurred),
+        cmocka_unit_test(stated_kernel_near_the_middle),
+        cmocka_unit_test(edges_are_fine),
         cmocka_unit_test(spot_in_the_picture),
         cmocka_unit_test(lens_is_the_lens),
         cmocka_unit_test(hand_poses),
