@@ -52,12 +52,14 @@ static bool plane_take(plane *out, const alb_image *image, const char *channel, 
 }
 
 // Observes one channel of an image, builds the forward model and fits.
-static bool fit_plane(alb_fitting *fitting, alb_side side, int channel, const alb_face *face, const plane *pixels,
-                      const alb_spot *spot, double relative_scale_sd, alb_text *notes, alb_error *error)
+static bool fit_plane(alb_fitting *fitting, const char *source, alb_side side, int channel, const alb_face *face,
+                      const plane *pixels, const alb_spot *spot, double relative_scale_sd, alb_text *notes,
+                      alb_error *error)
 {
-    char name[64];
+    char name[ALB_NAME_SIZE + 128];
     alb_measurement *measurement = &fitting->sides[side][channel];
-    snprintf(name, sizeof name, "%s %s", alb_side_names[side], fitting->material.channel_names[channel]);
+    snprintf(name, sizeof name, "%.100s: %s %s", source, alb_side_names[side],
+             fitting->material.channel_names[channel]);
     const alb_channel observed = {face, pixels->value, pixels->variance, name};
     if (!alb_observe(&measurement->readings, &observed, error) ||
         !alb_operator_create(&measurement->forward, &measurement->readings, spot, error))
@@ -150,8 +152,8 @@ static bool fit_product(alb_fitting *fitting, alb_provenance *provenance, alb_te
     for (int c = 0; ok && c < calibration->channels; c++) {
         plane pixels = {0};
         ok = plane_take(&pixels, &image, calibration->channel_names[c], M_PI, INFINITY, error) &&
-             fit_plane(fitting, product->side, c, &face, &pixels, &spots[c], product->relative_scale_sd[c], notes,
-                       error);
+             fit_plane(fitting, product->shot, product->side, c, &face, &pixels, &spots[c],
+                       product->relative_scale_sd[c], notes, error);
         plane_free(&pixels);
     }
     for (int c = 0; c < 3; c++)
@@ -235,7 +237,7 @@ static bool fit_image(alb_fitting *fitting, alb_text *notes, const char *path, a
     for (int c = 0; ok && c < fitting->material.channels; c++) {
         plane pixels = {0};
         ok = plane_take(&pixels, &image, fitting->material.channel_names[c], 1, saturation, error) &&
-             fit_plane(fitting, side, c, &face, &pixels, spot, 0, notes, error);
+             fit_plane(fitting, alb_path_name(path), side, c, &face, &pixels, spot, 0, notes, error);
         plane_free(&pixels);
     }
     alb_face_free(&face);
