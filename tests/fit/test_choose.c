@@ -139,7 +139,8 @@ static void energy_is_kept_where_no_form_fits(void **state)
                       outcome.fitted.total, outcome.fitted.total_sd, alb_profile_total(&truth),
                       100 * (outcome.fitted.total / alb_profile_total(&truth) - 1));
         assert_true(outcome.discrepancy_relative > 0.01);
-        check_relative(outcome.fitted.total, alb_profile_total(&truth), 0.02); // what the demonstration promises
+        // without the energy as a reading these end at -0.8 and -1.2 %: half of the smaller tells the two apart
+        check_relative(outcome.fitted.total, alb_profile_total(&truth), 0.006);
         check_near(outcome.fitted.total, alb_profile_total(&truth), 4 * outcome.fitted.total_sd);
         alb_readings_free(&readings);
     }
