@@ -28,9 +28,10 @@ typedef struct alb_solution {
     alb_tracer tracer;
     alb_form_factors factors;
     alb_scatter scatter;
-    double (*irradiance)[3]; // direct, of the lights
+    double (*irradiance)[3]; // direct, of the lights, and of small lamps
     double (*exitance)[3];   // emitted by lamps
     double (*radiosity)[3];  // all that leaves
+    bool lamps_sampled;      // lamps cover less than a twentieth of the scene: their direct light is part of irradiance
     alb_radiosity_report report;
     double row_sum, column_sum; // largest of S'
     alb_balance balance;
