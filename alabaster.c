@@ -4,10 +4,6 @@
 #include <string.h>
 
 #pragma weak alb_capture_command
-#pragma weak alb_calibrate_command
-#pragma weak alb_fit_command
-#pragma weak alb_render_command
-#pragma weak alb_compare_command
 
 static const alb_command *const commands[] = {
     &alb_capture_command, &alb_calibrate_command, &alb_fit_command, &alb_render_command, &alb_compare_command,

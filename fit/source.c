@@ -51,14 +51,17 @@ static bool plane_take(plane *out, const alb_image *image, const char *channel, 
     return true;
 }
 
-// Observes one channel of an image, builds the forward model and fits.
-static bool fit_plane(alb_fitting *fitting, alb_side side, int channel, const alb_face *face, const plane *pixels,
-                      const alb_spot *spot, double relative_scale_sd, alb_text *notes, alb_error *error)
+// Observes one channel of an image, builds the forward model and fits. Errors call the image `from`; notes, which end
+// up in derived files, do not.
+static bool fit_plane(alb_fitting *fitting, const char *from, alb_side side, int channel, const alb_face *face,
+                      const plane *pixels, const alb_spot *spot, double relative_scale_sd, alb_text *notes,
+                      alb_error *error)
 {
-    char name[64];
+    char name[64], full_name[1024];
     alb_measurement *measurement = &fitting->sides[side][channel];
     snprintf(name, sizeof name, "%s %s", alb_side_names[side], fitting->material.channel_names[channel]);
-    const alb_channel observed = {face, pixels->value, pixels->variance, name};
+    snprintf(full_name, sizeof full_name, "%.900s: %s", from, name);
+    const alb_channel observed = {face, pixels->value, pixels->variance, full_name};
     if (!alb_observe(&measurement->readings, &observed, error) ||
         !alb_operator_create(&measurement->forward, &measurement->readings, spot, error))
         return false;
@@ -150,8 +153,8 @@ static bool fit_product(alb_fitting *fitting, alb_provenance *provenance, alb_te
     for (int c = 0; ok && c < calibration->channels; c++) {
         plane pixels = {0};
         ok = plane_take(&pixels, &image, calibration->channel_names[c], M_PI, INFINITY, error) &&
-             fit_plane(fitting, product->side, c, &face, &pixels, &spots[c], product->relative_scale_sd[c], notes,
-                       error);
+             fit_plane(fitting, product->shot, product->side, c, &face, &pixels, &spots[c],
+                       product->relative_scale_sd[c], notes, error);
         plane_free(&pixels);
     }
     for (int c = 0; c < 3; c++)
@@ -235,7 +238,7 @@ static bool fit_image(alb_fitting *fitting, alb_text *notes, const char *path, a
     for (int c = 0; ok && c < fitting->material.channels; c++) {
         plane pixels = {0};
         ok = plane_take(&pixels, &image, fitting->material.channel_names[c], 1, saturation, error) &&
-             fit_plane(fitting, side, c, &face, &pixels, spot, 0, notes, error);
+             fit_plane(fitting, path, side, c, &face, &pixels, spot, 0, notes, error);
         plane_free(&pixels);
     }
     alb_face_free(&face);

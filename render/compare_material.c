@@ -1,11 +1,12 @@
 // A fitted material against the truth of a virtual rig (truth.json: radial kernel counted from photons, in bins).
 //   deviation     = (recovered total - true total) / true total
 //   z             = (recovered - true) / sqrt(sd^2 + true sd^2): 1 is what the error bars promise
-//   rms of curve  = sqrt(mean over bins of (S_fit(r) / S_true - 1)^2), each bin once, from r = 0.5 mm (outside the
-//   beam)
-//                   to the first bin whose own sd exceeds 10 %
-// Stops being true: S_fit is taken at the bin's radius and the truth is the bin's mean, which differ by (b h)^2 / 24
-// for a slope b and a bin width h; the true sd in the rms is not subtracted.
+//   rms of curve  = sqrt(mean over bins of (S_fit / S_true - 1)^2), each bin once, from r = 0.5 mm (outside the beam)
+//   to
+//                   the first bin whose own sd exceeds 10 %; S_fit is the fit's mean over the bin's ring, closed form
+// The truth states each bin by its mean radius r = m + h^2 / (12 m), m its middle and h its width, and r_(i+1) -
+// r_(i-1) = 2 h where widths grow evenly. Stops being true: widths that change otherwise; and the truth's own noise, up
+// to 10 % in the last bins, is part of the rms.
 #include "render/compare.h"
 
 #include "base/memory.h"
@@ -59,6 +60,20 @@ static bool read_profile(alb_profile_check *p, alb_node node, alb_error *error)
     return true;
 }
 
+// The fit's mean over the ring of bin i, 1/mm^2.
+static double fitted_mean(const alb_profile_check *p, size_t i)
+{
+    const size_t before = i > 0 ? i - 1 : i, after = i + 1 < p->count ? i + 1 : i;
+    const double r = p->r_mm[i];
+    if (before == after || !(r > 0))
+        return alb_profile_value(&p->fitted.profile, r);
+    const double width = fmin((p->r_mm[after] - p->r_mm[before]) / (double)(after - before), 1.5 * r);
+    const double middle = (r + sqrt(r * r - width * width / 3)) / 2;
+    const double inner = fmax(middle - width / 2, 0), outer = middle + width / 2;
+    return 2 * (alb_profile_disc(&p->fitted.profile, outer) - alb_profile_disc(&p->fitted.profile, inner)) /
+           (outer * outer - inner * inner);
+}
+
 static void measure_curve(alb_profile_check *p)
 {
     double squares = 0;
@@ -68,7 +83,7 @@ static void measure_curve(alb_profile_check *p)
             continue;
         if (!(p->sd_per_mm2[i] <= worst_relative_sd * p->value_per_mm2[i]) || !(p->value_per_mm2[i] > 0))
             break;
-        const double ratio = alb_profile_value(&p->fitted.profile, p->r_mm[i]) / p->value_per_mm2[i];
+        const double ratio = fitted_mean(p, i) / p->value_per_mm2[i];
         squares += (ratio - 1) * (ratio - 1);
         p->from_mm = p->bins++ ? p->from_mm : p->r_mm[i];
         p->to_mm = p->r_mm[i];

@@ -2,16 +2,15 @@
 //     point        mean over the patch of  Phi cos / (4 pi d^2), where it sees the light
 //     spot         Phi / N for each of N rays, even in solid angle inside the cone, that meets the patch's front, over
 //     A projector    the same with parallel rays, even over the disc or its pixels, displaced by the Gaussian blur
-//     lamp         integral over the lamps of  M cos cos' / (pi d^2), where they see each other
 //     environment  (pi / R) sum of L(d_q) over the sky rays q of the patch's form factors
-// Stops being true: a point of light nearer to a patch than a tenth of its size is held at that distance; a map with a
+// Stops being true: a point light nearer to a patch than a tenth of its size is held at that distance; a map with a
 // small sun is seen by few of the R rays. A ray that meets the back of a patch is absorbed there.
 #include "render/light.h"
 #include "base/memory.h"
 #include "base/random.h"
 #include <stdlib.h>
 
-enum { POINTS = 4, RAYS = 1 << 20, LAMP_RAYS = 64 }; // POINTS^2 on a patch
+enum { POINTS = 4, RAYS = 1 << 20 }; // POINTS^2 on a patch
 
 const char *const alb_light_names[ALB_LIGHTS] = {"point", "spot", "projector", "environment"};
 
@@ -201,84 +200,4 @@ bool alb_light_add(double (*irradiance)[3], const alb_light *light, const alb_pa
     default:
         return add_beam(irradiance, light, patches, tracer, seed, stream, error);
     }
-}
-
-// Emitting patches with their running total of power, summed over the channels.
-typedef struct lamps {
-    uint32_t *patches;
-    double *power_until;
-    size_t count;
-} lamps;
-
-static bool lamps_create(lamps *out, const double (*exitance)[3], const alb_patches *patches, alb_error *error)
-{
-    double power = 0;
-    if (!(out->patches = alb_allocate(patches->count, sizeof *out->patches, error)) ||
-        !(out->power_until = alb_allocate(patches->count, sizeof *out->power_until, error)))
-        return false;
-    for (size_t p = 0; p < patches->count; p++) {
-        const double sum = exitance[p][0] + exitance[p][1] + exitance[p][2];
-        if (sum <= 0)
-            continue;
-        power += sum * patches->areas_mm2[p];
-        out->patches[out->count] = (uint32_t)p;
-        out->power_until[out->count++] = power;
-    }
-    return true;
-}
-
-// The lamp at which the running total reaches `power`, and how far into it, 0..1.
-static uint32_t lamp_at(double *into, const lamps *from, double power)
-{
-    size_t low = 0, high = from->count - 1;
-    while (low < high) {
-        const size_t middle = (low + high) / 2;
-        if (from->power_until[middle] > power)
-            high = middle;
-        else
-            low = middle + 1;
-    }
-    const double before = low ? from->power_until[low - 1] : 0;
-    *into = (power - before) / (from->power_until[low] - before);
-    return from->patches[low];
-}
-
-// cos cos' / (pi d^2) from a point of the patch to a point of the lamp, 0 where they do not see each other.
-static double lamp_kernel(const alb_patches *patches, const alb_tracer *tracer, size_t patch, alb_vector point,
-                          uint32_t lamp, alb_vector source)
-{
-    const alb_vector to = alb_sub(source, point);
-    const double distance2 = fmax(alb_dot(to, to), 0.01 * patches->areas_mm2[patch]);
-    const double here = alb_dot(to, patches->normals[patch]), there = -alb_dot(to, patches->normals[lamp]);
-    if (here <= 0 || there <= 0 || alb_tracer_blocked(tracer, point, source))
-        return 0;
-    return here * there / (M_PI * distance2 * distance2);
-}
-
-bool alb_light_add_lamps(double (*irradiance)[3], const double (*exitance)[3], const alb_patches *patches,
-                         const alb_tracer *tracer, uint64_t seed, uint64_t stream, alb_error *error)
-{
-    lamps from = {0};
-    const bool ok = lamps_create(&from, exitance, patches, error);
-    const double power = ok && from.count ? from.power_until[from.count - 1] : 0;
-#pragma omp parallel for schedule(dynamic, 64)
-    for (size_t p = 0; p < (power > 0 ? patches->count : 0); p++) {
-        alb_random random = alb_random_at(seed, stream, p);
-        const double start = alb_random_uniform(&random), turn = alb_random_uniform(&random);
-        for (int k = 0; k < LAMP_RAYS; k++) {
-            // the lattice of form_factor.c, over the lamps: along their power, and across each patch
-            double into, across = 0.6180339887498949 * k + turn;
-            const uint32_t lamp = lamp_at(&into, &from, power * (k + start) / LAMP_RAYS);
-            const double u = alb_random_uniform(&random), v = alb_random_uniform(&random);
-            const alb_vector point = alb_patch_point(patches, p, u, v);
-            const alb_vector source = alb_patch_point(patches, lamp, into, across - floor(across));
-            const double sum = exitance[lamp][0] + exitance[lamp][1] + exitance[lamp][2];
-            const double weight = power / sum / LAMP_RAYS * lamp_kernel(patches, tracer, p, point, lamp, source);
-            for (int c = 0; c < 3; c++)
-                irradiance[p][c] += weight * exitance[lamp][c];
-        }
-    }
-    free(from.patches);
-    free(from.power_until);
-    return ok;
 }

@@ -36,9 +36,3 @@ void alb_light_sky(double radiance[3], const alb_light *light, alb_vector direct
 bool alb_light_add(double (*irradiance)[3], const alb_light *light, const alb_patches *patches,
                    const alb_tracer *tracer, const alb_form_factors *factors, uint64_t seed, uint64_t stream,
                    alb_error *error);
-
-// Adds the irradiance of lamps, the patches with exitance (patch_count rows), by 64 shadow rays a patch to points
-// spread evenly over the lamps' power. For lamps that are small against the scene: few rays of the form factors would
-// find them.
-bool alb_light_add_lamps(double (*irradiance)[3], const double (*exitance)[3], const alb_patches *patches,
-                         const alb_tracer *tracer, uint64_t seed, uint64_t stream, alb_error *error);

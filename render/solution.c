@@ -1,47 +1,36 @@
-// The order of the steps, timed. Lamps that cover little of the scene are sampled by shadow rays rather than found by
-// the rays of the form factors, whose noise they would be. Balance, H = E + F B the whole irradiance, kappa the column
-// sums of S':
+// The order of the steps, timed. Small lamps light the scene directly (lamp.h): their light is then part of E, M is
+// left out of the solution and of the balance, and is added to B at the end. Balance, H = E + F B the whole irradiance,
+// kappa the column sums of S':
 //     in = sum A (E + M),  absorbed = sum A (1 - kappa) H,  escaped = sum A B (share of sky rays), lost likewise for
 //     backs
 #include "render/solution.h"
 #include "base/memory.h"
 #include "base/progress.h"
+#include "render/lamp.h"
 #include <stdlib.h>
 #include <string.h>
 
 const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "lights", "scattering", "solve"};
 
-// Where lamps are sampled, the balance is solved for what patches send back; their own light comes on top.
-static void add_exitance(alb_solution *s)
-{
-    for (size_t p = 0; s->lamps_sampled && p < s->patches.count; p++)
-        for (int c = 0; c < 3; c++)
-            s->radiosity[p][c] += s->exitance[p][c];
-}
-
 static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
     const size_t n = s->patches.count;
-    double lamp_area = 0, area = 0;
     if (!(s->irradiance = alb_allocate(n, sizeof *s->irradiance, error)) ||
         !(s->exitance = alb_allocate(n, sizeof *s->exitance, error)) ||
         !(s->radiosity = alb_allocate(n, sizeof *s->radiosity, error)))
         return false;
+    for (size_t p = 0; p < n; p++)
+        memcpy(s->exitance[p], scene->surfaces[scene->mesh.groups[p]].exitance, sizeof s->exitance[p]);
     for (size_t i = 0; i < scene->light_count; i++)
         if (!alb_light_add(s->irradiance, &scene->lights[i], &s->patches, &s->tracer, &s->factors, scene->seed,
                            UINT64_MAX - i, error))
             return false;
-    for (size_t p = 0; p < n; p++) {
-        memcpy(s->exitance[p], scene->surfaces[scene->mesh.groups[p]].exitance, sizeof s->exitance[p]);
-        area += s->patches.areas_mm2[p];
-        lamp_area += s->exitance[p][0] + s->exitance[p][1] + s->exitance[p][2] > 0 ? s->patches.areas_mm2[p] : 0;
-        for (int c = 0; c < 3; c++)
-            s->balance.in[c] += s->patches.areas_mm2[p] * (s->irradiance[p][c] + s->exitance[p][c]);
-    }
-    s->lamps_sampled = lamp_area > 0 && lamp_area < area / 20;
+    s->lamps_direct = alb_lamps_are_small(&s->patches, (const double(*)[3])s->exitance);
+    if (s->lamps_direct && !alb_lamps_add(s->irradiance, (const double(*)[3])s->exitance, &s->patches, &s->tracer,
+                                          scene->seed, UINT64_MAX - ALB_LIGHTS_MAX, error))
+        return false;
     s->bytes[ALB_STAGE_LIGHTS] = 3 * n * sizeof *s->radiosity;
-    return !s->lamps_sampled || alb_light_add_lamps(s->irradiance, (const double(*)[3])s->exitance, &s->patches,
-                                                    &s->tracer, scene->seed, UINT64_MAX - ALB_LIGHTS_MAX, error);
+    return true;
 }
 
 static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
@@ -60,7 +49,6 @@ static bool take_balance(alb_solution *s, alb_error *error)
     const bool ok = gathered && kept;
     if (ok) {
         alb_form_factors_apply(gathered, &s->factors, (const double(*)[3])s->radiosity);
-        add_exitance(s);
         alb_scatter_column_sums(kept, &s->scatter, &s->patches);
     }
     for (size_t p = 0; ok && p < n; p++) {
@@ -72,6 +60,7 @@ static bool take_balance(alb_solution *s, alb_error *error)
         for (int c = 0; c < 3; c++) {
             const double area = s->patches.areas_mm2[p], irradiance = s->irradiance[p][c] + gathered[p][c];
             s->column_sum = fmax(s->column_sum, kept[p][c]);
+            s->balance.in[c] += area * (s->irradiance[p][c] + (s->lamps_direct ? 0 : s->exitance[p][c]));
             s->balance.absorbed[c] += area * (1 - kept[p][c]) * irradiance;
             s->balance.escaped[c] += area * s->radiosity[p][c] * (double)sky / (double)rays;
             s->balance.lost[c] += area * s->radiosity[p][c] * (double)back / (double)rays;
@@ -85,14 +74,19 @@ static bool take_balance(alb_solution *s, alb_error *error)
 static bool solve(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
     const size_t n = s->patches.count;
+    double(*emitted)[3] = alb_allocate(n, sizeof *emitted, error);
     s->bytes[ALB_STAGE_SOLVE] = 23 * n * sizeof *s->radiosity;
-    double(*none)[3] = alb_allocate(n, sizeof *none, error);
-    const bool ok = none &&
-                    alb_radiosity_solve(s->radiosity, &s->report, (const double(*)[3])s->irradiance,
-                                        (const double(*)[3])(s->lamps_sampled ? none : s->exitance), &s->scatter,
-                                        &s->factors, s->patches.areas_mm2, scene->residual, error) &&
-                    take_balance(s, error);
-    free(none);
+    if (emitted && !s->lamps_direct)
+        memcpy(emitted, s->exitance, n * sizeof *emitted);
+    const bool ok =
+        emitted &&
+        alb_radiosity_solve(s->radiosity, &s->report, (const double(*)[3])s->irradiance, (const double(*)[3])emitted,
+                            &s->scatter, &s->factors, s->patches.areas_mm2, scene->residual, error) &&
+        take_balance(s, error);
+    free(emitted);
+    for (size_t p = 0; ok && s->lamps_direct && p < n; p++)
+        for (int c = 0; c < 3; c++)
+            s->radiosity[p][c] += s->exitance[p][c];
     return ok;
 }
 

@@ -393,6 +393,36 @@ static void good_input_still_works(void **state)
     assert_true(alb_file_exists("cli/picture.exr") && alb_file_exists("cli/picture.png"));
 }
 
+// A stated profile 0.01 e^(-r/2) through a table: its total is 0.08 pi = 0.2513, the truth says 0.25 and then 0.26.
+static void limits_decide_the_exit_code(void **state)
+{
+    (void)state;
+    char table[8192] = "r_mm,value_per_mm2,sd_per_mm2\n";
+    for (int i = 1; i < 60; i++) {
+        const double r = 0.25 * i, value = 1e-2 * exp(-r / 2);
+        snprintf(table + strlen(table), sizeof table - strlen(table), "%.17g,%.17g,%.17g\n", r, value, 0.01 * value);
+    }
+    save_text("cli/exact.csv", table);
+    const char *const truth =
+        "{\"format\":1,\"channels\":{\"Y\":{\"reflection\":{\"total\":%s,\"total_sd\":0,\"r_mm\":[],"
+        "\"value_per_mm2\":[],\"sd_per_mm2\":[]}}}}";
+    char text[512];
+    snprintf(text, sizeof text, truth, "0.25");
+    save_text("cli/near.json", text);
+    snprintf(text, sizeof text, truth, "0.26");
+    save_text("cli/far.json", text);
+    assert_int_equal(run("fit --table cli/exact.csv --side reflection -o cli/exact"), 0);
+    assert_int_equal(run("compare cli/exact/material.json cli/near.json -o cli/limit --limit-percent 2"), 0);
+    assert_non_null(strstr(output, "+0.53 %"));
+    assert_int_equal(run("compare cli/exact/material.json cli/far.json -o cli/limit --limit-percent 2"), ALB_DIFFERS);
+    assert_non_null(strstr(complaint, "-3.34 %"));
+    assert_non_null(strstr(output, "-3.34 %")); // the table is printed and the report written all the same
+    char *json = slurp("cli/limit/compare.json");
+    assert_non_null(strstr(json, "far.json"));
+    free(json);
+    assert_int_equal(run("compare cli/exact/material.json cli/far.json -o cli/limit"), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -402,6 +432,7 @@ int main(void)
         cmocka_unit_test(content_that_is_wrong),
         cmocka_unit_test(measurements_that_show_nothing),
         cmocka_unit_test(good_input_still_works),
+        cmocka_unit_test(limits_decide_the_exit_code),
     };
     return cmocka_run_group_tests(tests, make_inputs, remove_inputs);
 }
