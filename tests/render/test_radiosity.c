@@ -306,7 +306,7 @@ static void lights_send_their_flux(void **state)
 }
 
 // A small plate at (0, 0, 0) under the corner of a square lamp of side 1 at height 1: F = 0.138531605995 (element to a
-// parallel rectangle over its corner). The lamp is a twentieth of the scene once a wide dark floor lies under both.
+// parallel rectangle over its corner). The lamp is small against the scene once a wide floor lies under both.
 static void lamps_light_what_they_see(void **state)
 {
     (void)state;
