@@ -149,8 +149,9 @@ bool alb_session_read(alb_session *session, const char *folder, alb_error *error
     char path[ALB_PATH_SIZE];
     alb_node root;
     *session = (alb_session){0};
-    if (!alb_path_join(path, folder, "session.json", error) || !alb_path_join(session->folder, folder, "", error))
+    if (!alb_path_join(path, folder, "session.json", error))
         return false;
+    strcpy(session->folder, folder); // shorter than path
     alb_record *record = alb_record_read(path, error);
     const bool ok = record && alb_record_root(&root, record, error) && parse(session, root, error);
     alb_record_free(record);

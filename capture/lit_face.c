@@ -1,0 +1,142 @@
+// Irradiance: E = E0 sum over pixels of Phi_x Phi_y, Phi = (erf((x - x0 + p/2) / (s sqrt 2)) - erf((x - x0 - p/2) / (s
+// sqrt 2))) / 2. White reference: L = rho E / pi. Slab: M = E0 sum over points q of k(|x - q|) dA + unscattered E, L =
+// M / pi, where k is the kernel already blurred by s, so that a pixel is an even square; points at most 0.8 s apart sum
+// it to e^(-2 pi^2 / 0.64) of itself (Poisson's summation formula).
+//
+// The face is taken as ground, shedding light evenly in all directions (L = M / pi), and the slab as wider than the
+// view. Not true for polished faces, near the slab's edges, or where the pattern's grid of discs stands off the middle.
+#include "capture/lit_face.h"
+#include "base/memory.h"
+#include <math.h>
+#include <stdlib.h>
+
+static const double pi = 3.141592653589793;
+enum { POINTS_MOST = 20000 };
+
+static bool inside(const alb_pattern *pattern, int x, int y, int half)
+{
+    const double dx = x - half + 0.5, dy = y - half + 0.5;
+    return dx * dx + dy * dy <= 0.25 * pattern->diameter_px * pattern->diameter_px;
+}
+
+// Lists a disc's pixels and the points inside them.
+static bool fill_disc(alb_lit_face *face, const alb_pattern *pattern, alb_error *error)
+{
+    const int half = (int)ceil(pattern->diameter_px / 2), n = (int)ceil(face->pixel_mm / (0.8 * face->blur_sd_mm));
+    const double p = face->pixel_mm;
+    long pixels = 0;
+    for (int i = 0; i < 4 * half * half; i++)
+        pixels += inside(pattern, i % (2 * half), i / (2 * half), half);
+    const long points = pixels * n * n, discs = face->disc_count;
+    if (points * discs > POINTS_MOST)
+        return alb_fail(error, ALB_BAD_DATA,
+                        "a pattern of %ld lit pixels, %d points each, is more than the %d points that "
+                        "the virtual rig sums; use fewer or smaller discs",
+                        pixels * discs, n * n, POINTS_MOST);
+    face->pixel = alb_allocate((size_t)pixels, sizeof *face->pixel, error);
+    face->point = alb_allocate((size_t)points, sizeof *face->point, error);
+    if (!face->pixel || !face->point)
+        return false;
+    for (int i = 0; i < 4 * half * half; i++) {
+        if (!inside(pattern, i % (2 * half), i / (2 * half), half))
+            continue;
+        const double x = (i % (2 * half) - half + 0.5) * p, y = (i / (2 * half) - half + 0.5) * p; // NOLINT: whole rows
+        face->pixel[face->pixel_count][0] = x;
+        face->pixel[face->pixel_count++][1] = y;
+        face->disc_radius_mm = fmax(face->disc_radius_mm, hypot(x, y) + p);
+        for (int j = 0; j < n * n; j++) {
+            face->point[face->point_count][0] = x + ((j % n + 0.5) / n - 0.5) * p;
+            face->point[face->point_count++][1] = y + ((j / n + 0.5) / n - 0.5) * p; // NOLINT: whole rows
+        }
+    }
+    face->point_mm2 = p * p / (n * n);
+    return true;
+}
+
+bool alb_lit_face_create(alb_lit_face *face, const alb_truth *truth, const alb_pattern *pattern,
+                         const alb_kernel *kernels, const double white_reflectance[3], alb_error *error)
+{
+    *face = (alb_lit_face){.kind = pattern->kind,
+                           .kernels = kernels,
+                           .pixel_mm = truth->projector.pixel_mm,
+                           .blur_sd_mm = truth->projector.blur_sd_mm};
+    for (int c = 0; c < 3; c++) {
+        face->reflectance[c] = white_reflectance[c];
+        face->irradiance[c] = truth->projector.irradiance_w_per_mm2[c];
+    }
+    if (pattern->kind != ALB_PATTERN_SPOT && pattern->kind != ALB_PATTERN_GRID)
+        return true;
+    const bool grid = pattern->kind == ALB_PATTERN_GRID;
+    const int columns = grid ? pattern->columns : 1, rows = grid ? pattern->rows : 1;
+    face->disc_count = columns * rows;
+    face->disc = alb_allocate((size_t)face->disc_count, sizeof *face->disc, error);
+    if (!face->disc || !fill_disc(face, pattern, error)) {
+        alb_lit_face_free(face);
+        return false;
+    }
+    for (int i = 0; i < face->disc_count; i++) {
+        face->disc[i][0] = (i % columns - 0.5 * (columns - 1)) * pattern->pitch_px * face->pixel_mm;
+        face->disc[i][1] = (i / columns - 0.5 * (rows - 1)) * pattern->pitch_px * face->pixel_mm; // NOLINT: whole rows
+    }
+    return true;
+}
+
+void alb_lit_face_free(alb_lit_face *face)
+{
+    free(face->disc);
+    free(face->pixel);
+    free(face->point);
+    *face = (alb_lit_face){0};
+}
+
+double alb_lit_face_irradiance(const alb_lit_face *face, double x_mm, double y_mm)
+{
+    if (face->kind == ALB_PATTERN_WHITE)
+        return 1;
+    const double scale = 1 / (face->blur_sd_mm * sqrt(2)), half = face->pixel_mm / 2;
+    const double reach = face->disc_radius_mm + 7 * face->blur_sd_mm;
+    double sum = 0;
+    for (int i = 0; i < face->disc_count; i++) {
+        const double dx = x_mm - face->disc[i][0], dy = y_mm - face->disc[i][1];
+        if (dx * dx + dy * dy > reach * reach)
+            continue;
+        for (int j = 0; j < face->pixel_count; j++) {
+            const double x = dx - face->pixel[j][0], y = dy - face->pixel[j][1];
+            sum += 0.25 * (erf((x + half) * scale) - erf((x - half) * scale)) *
+                   (erf((y + half) * scale) - erf((y - half) * scale));
+        }
+    }
+    return sum;
+}
+
+// Exitance per irradiance of a white pixel.
+static void exitance(double out[3], const alb_lit_face *face, double x_mm, double y_mm)
+{
+    double sum[3] = {0, 0, 0};
+    for (int i = 0; i < face->disc_count; i++)
+        for (int j = 0; j < face->point_count; j++) {
+            const double dx = x_mm - face->disc[i][0] - face->point[j][0],
+                         dy = y_mm - face->disc[i][1] - face->point[j][1];
+            const double r = sqrt(dx * dx + dy * dy);
+            for (int c = 0; c < 3; c++)
+                sum[c] += alb_kernel_value(&face->kernels[c], r);
+        }
+    const double e = alb_lit_face_irradiance(face, x_mm, y_mm);
+    for (int c = 0; c < 3; c++)
+        out[c] = face->kind == ALB_PATTERN_WHITE ? face->kernels[c].total
+                                                 : sum[c] * face->point_mm2 + face->kernels[c].unscattered * e;
+}
+
+void alb_lit_face_radiance(double out[3], const void *scene, double x_mm, double y_mm)
+{
+    const alb_lit_face *face = scene;
+    if (face->kernels) {
+        exitance(out, face, x_mm, y_mm);
+    } else {
+        const double e = alb_lit_face_irradiance(face, x_mm, y_mm);
+        for (int c = 0; c < 3; c++)
+            out[c] = face->reflectance[c] * e;
+    }
+    for (int c = 0; c < 3; c++)
+        out[c] *= face->irradiance[c] / pi;
+}
