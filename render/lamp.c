@@ -1,7 +1,7 @@
 // Direct light of lamps by sampling their area. With M the exitance, x uniform on the patch, y on the lamps with
 // density p(y) = m / sum (A m), m the mean of M over the channels:
 //     E = integral M cos cos' V / (pi d^2) dA' = mean over samples of  M cos cos' V / (pi d^2 p)
-// Samples are stratified over the lamps in the order of their patches. A small lamp is met by few of the R rays of a
+// Samples form a lattice over the lamps in the order of their patches. A small lamp is met by few of the R rays of a
 // form-factor row, one of 256 for a solid angle of 1/80: its light then comes in specks.
 // Stops being true nearer to a lamp than half the size of its patch, where d is held.
 #include "render/lamp.h"
@@ -48,7 +48,8 @@ static bool collect(lamps *out, const double (*exitance)[3], const alb_patches *
     return true;
 }
 
-static size_t lamp_at(const lamps *from, double flux)
+// The lamp at which the running total reaches `flux`, and how far into it, 0..1.
+static size_t lamp_at(double *into, const lamps *from, double flux)
 {
     size_t low = 0, high = from->count - 1;
     while (low < high) {
@@ -58,7 +59,9 @@ static size_t lamp_at(const lamps *from, double flux)
         else
             low = middle + 1;
     }
-    return low;
+    const double before = low ? from->cumulative[low - 1] : 0;
+    *into = (flux - before) / (from->cumulative[low] - before);
+    return from->patches[low];
 }
 
 static void gather(double irradiance[3], size_t patch, const lamps *from, const double (*exitance)[3],
@@ -67,11 +70,14 @@ static void gather(double irradiance[3], size_t patch, const lamps *from, const 
     const double all = from->cumulative[from->count - 1];
     double sum[3] = {0};
     alb_random random = alb_random_at(seed, stream, patch);
+    const double start = alb_random_uniform(&random), turn = alb_random_uniform(&random);
     for (int k = 0; k < SAMPLES; k++) {
-        const size_t lamp = from->patches[lamp_at(from, all * (k + alb_random_uniform(&random)) / SAMPLES)];
+        // the lattice of form_factor.c laid over the lamps: along their flux, and across each patch
+        double into, across = 0.6180339887498949 * k + turn;
+        const size_t lamp = lamp_at(&into, from, all * (k + start) / SAMPLES);
         const double u = alb_random_uniform(&random), v = alb_random_uniform(&random);
-        const double s = alb_random_uniform(&random), t = alb_random_uniform(&random);
-        const alb_vector x = alb_patch_point(patches, patch, u, v), y = alb_patch_point(patches, lamp, s, t);
+        const alb_vector x = alb_patch_point(patches, patch, u, v);
+        const alb_vector y = alb_patch_point(patches, lamp, into, across - floor(across));
         const alb_vector to = alb_sub(y, x);
         const double distance2 = alb_dot(to, to), length = sqrt(distance2);
         const double here = alb_dot(to, patches->normals[patch]) / length;
