@@ -3,10 +3,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#pragma weak alb_calibrate_command
-#pragma weak alb_fit_command
-#pragma weak alb_render_command
-#pragma weak alb_compare_command
 
 static const alb_command *const commands[] = {
     &alb_capture_command, &alb_calibrate_command, &alb_fit_command, &alb_render_command, &alb_compare_command,

@@ -62,6 +62,16 @@ static bool read_slab_path(bool *slab, alb_node node, alb_error *error)
            alb_node_fail(error, node, "path", "'%s' is neither slab nor solid", path);
 }
 
+// The profile of a colour channel: by name, or the only one there is.
+static const alb_profile *profile_of(const alb_material *material, alb_side side, int c)
+{
+    static const char *const names[3] = {"R", "G", "B"};
+    for (int k = 0; k < material->channels; k++)
+        if (material->channels == 1 || !strcmp(material->channel_names[k], names[c]))
+            return &material->fitted[side][k].profile;
+    return NULL;
+}
+
 static bool read_measured(alb_surface *surface, reader *in, alb_node node)
 {
     char path[ALB_PATH_SIZE];
@@ -72,11 +82,12 @@ static bool read_measured(alb_surface *surface, reader *in, alb_node node)
     surface->scatters = true;
     for (int side = 0; side <= (surface->slab ? ALB_TRANSMISSION : ALB_REFLECTION); side++)
         for (int c = 0; c < 3; c++) {
-            const alb_fitted *fitted = &material.fitted[side][material.channels >= 3 ? c : 0];
-            if (fitted->profile.form == ALB_FORM_NONE)
-                return alb_node_fail(in->error, node, "measured", "%s has no %s profile%s", path, alb_side_names[side],
-                                     side == ALB_TRANSMISSION ? "; use \"path\": \"solid\"" : "");
-            surface->profiles[side][c] = fitted->profile;
+            const alb_profile *profile = profile_of(&material, (alb_side)side, c);
+            if (!profile || profile->form == ALB_FORM_NONE)
+                return alb_node_fail(in->error, node, "measured", "%s has no %s profile for channel %c%s", path,
+                                     alb_side_names[side], "RGB"[c],
+                                     side == ALB_TRANSMISSION ? "; \"path\": \"solid\" needs reflection alone" : "");
+            surface->profiles[side][c] = *profile;
         }
     return true;
 }

@@ -1,9 +1,12 @@
-// The order of the steps, timed. Balance, H = E + F B the whole irradiance, kappa the column sums of S':
+// The order of the steps, timed. Small lamps light the scene directly (lamp.h): their light is then part of E, M is
+// left out of the solution and of the balance, and is added to B at the end. Balance, H = E + F B the whole irradiance,
+// kappa the column sums of S':
 //     in = sum A (E + M),  absorbed = sum A (1 - kappa) H,  escaped = sum A B (share of sky rays), lost likewise for
 //     backs
 #include "render/solution.h"
 #include "base/memory.h"
 #include "base/progress.h"
+#include "render/lamp.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,6 +25,10 @@ static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *er
         if (!alb_light_add(s->irradiance, &scene->lights[i], &s->patches, &s->tracer, &s->factors, scene->seed,
                            UINT64_MAX - i, error))
             return false;
+    s->lamps_direct = alb_lamps_are_small(&s->patches, (const double(*)[3])s->exitance);
+    if (s->lamps_direct && !alb_lamps_add(s->irradiance, (const double(*)[3])s->exitance, &s->patches, &s->tracer,
+                                          scene->seed, UINT64_MAX - ALB_LIGHTS_MAX, error))
+        return false;
     s->bytes[ALB_STAGE_LIGHTS] = 3 * n * sizeof *s->radiosity;
     return true;
 }
@@ -53,7 +60,7 @@ static bool take_balance(alb_solution *s, alb_error *error)
         for (int c = 0; c < 3; c++) {
             const double area = s->patches.areas_mm2[p], irradiance = s->irradiance[p][c] + gathered[p][c];
             s->column_sum = fmax(s->column_sum, kept[p][c]);
-            s->balance.in[c] += area * (s->irradiance[p][c] + s->exitance[p][c]);
+            s->balance.in[c] += area * (s->irradiance[p][c] + (s->lamps_direct ? 0 : s->exitance[p][c]));
             s->balance.absorbed[c] += area * (1 - kept[p][c]) * irradiance;
             s->balance.escaped[c] += area * s->radiosity[p][c] * (double)sky / (double)rays;
             s->balance.lost[c] += area * s->radiosity[p][c] * (double)back / (double)rays;
@@ -66,11 +73,21 @@ static bool take_balance(alb_solution *s, alb_error *error)
 
 static bool solve(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
-    s->bytes[ALB_STAGE_SOLVE] = 23 * s->patches.count * sizeof *s->radiosity;
-    return alb_radiosity_solve(s->radiosity, &s->report, (const double(*)[3])s->irradiance,
-                               (const double(*)[3])s->exitance, &s->scatter, &s->factors, s->patches.areas_mm2,
-                               scene->residual, error) &&
-           take_balance(s, error);
+    const size_t n = s->patches.count;
+    double(*emitted)[3] = alb_allocate(n, sizeof *emitted, error);
+    s->bytes[ALB_STAGE_SOLVE] = 23 * n * sizeof *s->radiosity;
+    if (emitted && !s->lamps_direct)
+        memcpy(emitted, s->exitance, n * sizeof *emitted);
+    const bool ok =
+        emitted &&
+        alb_radiosity_solve(s->radiosity, &s->report, (const double(*)[3])s->irradiance, (const double(*)[3])emitted,
+                            &s->scatter, &s->factors, s->patches.areas_mm2, scene->residual, error) &&
+        take_balance(s, error);
+    free(emitted);
+    for (size_t p = 0; ok && s->lamps_direct && p < n; p++)
+        for (int c = 0; c < 3; c++)
+            s->radiosity[p][c] += s->exitance[p][c];
+    return ok;
 }
 
 static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, alb_error *error)

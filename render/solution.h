@@ -17,7 +17,7 @@ extern const char *const alb_stage_names[ALB_STAGES];
 // sampling error of the form factors (their rows are exact, their reciprocity is statistical); zero where patches do
 // not see each other.
 typedef struct alb_balance {
-    double in[3];       // arrives from the lights and is emitted by lamps
+    double in[3];       // arrives from the lights and small lamps, or is emitted by large ones
     double absorbed[3]; // inside bodies and on opaque patches
     double escaped[3];  // leaves by the sky
     double lost[3];     // falls on the backs of patches
@@ -30,6 +30,7 @@ typedef struct alb_solution {
     alb_scatter scatter;
     double (*irradiance)[3]; // direct, of the lights
     double (*exitance)[3];   // emitted by lamps
+    bool lamps_direct;       // small lamps: their light is in the irradiance
     double (*radiosity)[3];  // all that leaves
     alb_radiosity_report report;
     double row_sum, column_sum; // largest of S'

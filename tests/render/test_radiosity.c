@@ -305,6 +305,49 @@ static void lights_send_their_flux(void **state)
     alb_scene_free(&scene);
 }
 
+// A small plate at (0, 0, 0) under the corner of a square lamp of side 1 at height 1: F = 0.138531605995 (element to a
+// parallel rectangle over its corner). The lamp is small against the scene once a wide floor lies under both.
+static void lamps_light_what_they_see(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_mesh mesh = {0};
+    alb_scene scene;
+    alb_solution s;
+    const alb_surface surfaces[2] = {{.name = "wall", .reflectance = {0.5, 0.5, 0.5}},
+                                     {.name = "lamp", .exitance = {3, 2, 1}}};
+    const double side[3] = {0.01, 1, 40}, height[3] = {0, 1, -1};
+    uint16_t group;
+    check_ok(alb_mesh_add_group(&group, &mesh, "", &error), &error);
+    for (int k = 0; k < 3; k++) {
+        const uint32_t a = (uint32_t)mesh.vertex_count;
+        for (int i = 0; i < 4; i++) {
+            const double x = side[k] * (i == 1 || i == 2), y = side[k] * (i >= 2);
+            const double shift = k == 0 ? -0.005 : k == 2 ? -20 : 0;
+            check_ok(alb_mesh_add_vertex(&mesh, (alb_vector){x + shift, y + shift, height[k]}, &error), &error);
+        }
+        const uint32_t order[2][4] = {{0, 1, 2, 3}, {0, 3, 2, 1}}, *o = order[k == 1];
+        check_ok(alb_mesh_add_face(&mesh, a + o[0], a + o[1], a + o[2], k == 1, &error), &error);
+        check_ok(alb_mesh_add_face(&mesh, a + o[0], a + o[2], a + o[3], k == 1, &error), &error);
+    }
+    scene_of(&scene, &mesh, surfaces, 2, 16);
+    double sum = 0, squares = 0;
+    for (uint64_t seed = 0; seed < 20; seed++) {
+        scene.seed = seed;
+        check_ok(alb_solution_create(&s, &scene, &error), &error);
+        assert_true(s.lamps_direct);
+        const double found = s.irradiance[0][0] / 3;
+        check_relative(s.irradiance[0][2], found, 1e-12);
+        sum += found, squares += found * found;
+        assert_true(s.radiosity[2][0] >= 3); // the lamp itself
+        alb_solution_free(&s);
+    }
+    const double mean = sum / 20, error_of_mean = sqrt(fmax(0, squares / 20 - mean * mean) / 19);
+    check_near(mean, 0.138531605995, 4 * error_of_mean);
+    check_below(error_of_mean, 0.002);
+    alb_scene_free(&scene);
+}
+
 static void threads_do_not_matter(void **state)
 {
     (void)state;
@@ -359,6 +402,7 @@ int main(void)
         cmocka_unit_test(refuses_scattering_that_creates_light),
         cmocka_unit_test(white_furnace),
         cmocka_unit_test(lights_send_their_flux),
+        cmocka_unit_test(lamps_light_what_they_see),
         cmocka_unit_test(threads_do_not_matter),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
