@@ -82,7 +82,8 @@ static void find_ranges(frame *f, const alb_panel *panel)
                 continue;
             include(&f->x_range, curve->x[i]);
             include(&f->y_range, curve->y[i]);
-            for (int sign = -1; sign <= 1 && has_bar(curve, i); sign += 2)
+            // A lower end close to 0 would stretch a logarithmic axis by decades that hold nothing.
+            for (int sign = panel->log_y ? 1 : -1; sign <= 1 && has_bar(curve, i); sign += 2)
                 if (alb_axis_accepts(panel->log_y, curve->y[i] + sign * curve->sd[i]))
                     include(&f->y_range, curve->y[i] + sign * curve->sd[i]);
         }

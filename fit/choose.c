@@ -1,9 +1,9 @@
 // Which form, and what is known of it.
 //
-// 1. Each form is fitted by the noise alone. The richer one is taken where it lowers chi-square by more than
-//    max(10.6, 2 ln n): a likelihood-ratio test at 1 % shared by the two candidates with a second term (chi-square of
-//    two degrees of freedom at 0.5 %), or BIC, whichever asks more. Between equally rich forms the smaller chi-square
-//    decides.
+// 1. Each form is fitted by the noise alone, the simplest first: one exponential, the tied signed pair (search.h), two
+//    exponentials, the signed pair: 2, 3, 4, 4 parameters. A richer one is taken where it lowers chi-square by more
+//    than max(10.6, 2 ln n) for two parameters or max(7.88, ln n) for one: a likelihood-ratio test at 1 % shared by two
+//    candidates (0.5 % each), or BIC, whichever asks more. Between equally rich forms the smaller chi-square decides.
 // 2. A form stands where P(chi-square) >= 1e-3. Then its parameters, covariance and total are those of this fit, and
 //    nothing else enters.
 // 3. Where no form stands, the form is an approximation and its errors are not those of the noise. Each reading then
@@ -12,7 +12,8 @@
 //    freedom (this inflates the covariance), and the energy that the image itself shows, sum value * area, becomes one
 //    more reading with the small sd the noise gives it: the fitted form conserves the measured energy, whatever it does
 //    between. Without that, two exponentials lose 8 % of the energy of a real reflection. Half of the share beyond the
-//    readings is added to the sd of the total. The form of least sum ln(sd_i^2 + t^2 f_i^2) + k ln n is taken.
+//    readings is added to the sd of the total. The form of least
+//    sum ln(sd_i^2 + t^2 f_i^2) + k ln n is taken, among those whose parameters the data decide where there is one.
 // 4. The sd of the common scale enters last: covariance += a a^T s^2 over the amplitudes, total likewise.
 //
 // The data do not decide where J^T J is singular, a parameter is uncertain by more than half of itself, a decay is
@@ -26,9 +27,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double reject_tail = 1e-3, gain_wanted = 10.6, relative_sd_limit = 0.5, measured_share_wanted = 0.5;
-static const alb_form candidates[ALB_ATTEMPTS_MAX] = {ALB_FORM_EXPONENTIAL, ALB_FORM_TWO_EXPONENTIALS,
-                                                      ALB_FORM_SIGNED_EXPONENTIALS};
+static const double reject_tail = 1e-3, tied_gain_wanted = 7.88, gain_wanted = 10.6, relative_sd_limit = 0.5,
+                    measured_share_wanted = 0.5;
+// simplest first
+static const alb_candidate candidates[ALB_ATTEMPTS_MAX] = {{ALB_FORM_EXPONENTIAL, false},
+                                                           {ALB_FORM_SIGNED_EXPONENTIALS, true},
+                                                           {ALB_FORM_TWO_EXPONENTIALS, false},
+                                                           {ALB_FORM_SIGNED_EXPONENTIALS, false}};
+enum { ONE, TIED };
 
 typedef struct fit {
     alb_profile profile;
@@ -44,8 +50,8 @@ static bool fit_by_noise(fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, const
     outcome->attempt_count = ALB_ATTEMPTS_MAX;
     for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
         alb_attempt *attempt = &outcome->attempts[f];
-        const int parameters = alb_form_parameter_count(candidates[f]);
-        *attempt = (alb_attempt){candidates[f], (double)NAN, (double)NAN, n - parameters, ""};
+        const int parameters = alb_candidate_parameters(candidates[f]);
+        *attempt = (alb_attempt){candidates[f].form, candidates[f].tied, (double)NAN, (double)NAN, n - parameters, ""};
         if (n < parameters + 1) {
             snprintf(attempt->rejected, ALB_REASON_SIZE, "%d readings are too few for %d parameters", n, parameters);
             continue;
@@ -62,36 +68,45 @@ static bool fit_by_noise(fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, const
     return true;
 }
 
-// Index of the form to take by the noise, -1 where none was found; *stands whether the noise lets it stand.
-static int simplest(bool *stands, const fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, int n)
+static void explain(const fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, int chosen)
 {
-    int rich = -1;
-    for (int f = 1; f < ALB_ATTEMPTS_MAX; f++)
-        if (fits[f].found && (rich < 0 || fits[f].chi_square < fits[rich].chi_square))
-            rich = f;
-    const double threshold = fmax(gain_wanted, 2 * log(n));
-    const double gain = rich >= 0 && fits[0].found ? fits[0].chi_square - fits[rich].chi_square : 0;
-    const int chosen = !fits[0].found ? rich : gain > threshold ? rich : 0;
     for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
         alb_attempt *attempt = &outcome->attempts[f];
         if (f == chosen || !fits[f].found)
             continue;
         const double tail = alb_chi_square_tail(attempt->chi_square, attempt->degrees_of_freedom);
+        const double gain = attempt->chi_square - fits[chosen].chi_square;
         if (tail < reject_tail)
             snprintf(attempt->rejected, ALB_REASON_SIZE, "chi-square %.5g for %d degrees of freedom (tail %.2g)",
                      attempt->chi_square, attempt->degrees_of_freedom, tail);
-        else if (f == 0)
-            snprintf(attempt->rejected, ALB_REASON_SIZE, "a second term lowers chi-square by %.4g, more than %.4g",
-                     gain, threshold);
-        else if (chosen == 0)
-            snprintf(attempt->rejected, ALB_REASON_SIZE, "lowers chi-square by %.4g only, %.4g wanted",
-                     fits[0].chi_square - fits[f].chi_square, threshold);
+        else if (gain > 0)
+            snprintf(attempt->rejected, ALB_REASON_SIZE, "chi-square larger by %.4g", gain);
         else
-            snprintf(attempt->rejected, ALB_REASON_SIZE, "chi-square larger by %.4g",
-                     fits[f].chi_square - fits[chosen].chi_square);
+            snprintf(attempt->rejected, ALB_REASON_SIZE, "lowers chi-square by %.4g only: not worth its parameters",
+                     -gain);
     }
+}
+
+// Index of the form to take by the noise, -1 where none was found; *stands whether the noise lets it stand.
+static int simplest(bool *stands, const fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, int n)
+{
+    int rich = -1;
+    for (int f = TIED + 1; f < ALB_ATTEMPTS_MAX; f++)
+        if (fits[f].found && (rich < 0 || fits[f].chi_square < fits[rich].chi_square))
+            rich = f;
+    const double one = fits[ONE].found ? fits[ONE].chi_square : (double)INFINITY;
+    const double tied = fits[TIED].found ? fits[TIED].chi_square : (double)INFINITY;
+    const double both = rich >= 0 ? fits[rich].chi_square : (double)INFINITY;
+    const double step = fmax(tied_gain_wanted, log(n)), steps = fmax(gain_wanted, 2 * log(n));
+    int chosen = fits[ONE].found ? ONE : -1;
+    if (tied < one - step && !(both < tied - step))
+        chosen = TIED;
+    else if (rich >= 0 && both < one - steps)
+        chosen = rich;
     *stands = chosen >= 0 &&
               alb_chi_square_tail(fits[chosen].chi_square, outcome->attempts[chosen].degrees_of_freedom) >= reject_tail;
+    if (*stands)
+        explain(fits, outcome, chosen);
     return chosen;
 }
 
@@ -122,14 +137,14 @@ static void widen(double *sd, const alb_readings *readings, const double *fitted
 
 // One form with its discrepancy and with the energy; sd has room for the readings and holds the widened ones at the
 // end.
-static bool fit_with_discrepancy(fit *out, double *sd, alb_form form, const alb_basis *basis, const alb_weighing *noise,
-                                 double energy_sd, alb_error *error)
+static bool fit_with_discrepancy(fit *out, double *sd, alb_candidate candidate, const alb_basis *basis,
+                                 const alb_weighing *noise, double energy_sd, alb_error *error)
 {
     const alb_readings *readings = noise->readings;
     const alb_weighing widened = {readings, noise->forward, sd, energy_sd};
-    const int parameters = alb_form_parameter_count(form);
+    const int parameters = alb_candidate_parameters(candidate);
     widen(sd, readings, readings->value, 0.1);
-    if (!alb_search(&out->profile, &out->chi_square, &out->found, form, basis, &widened, error))
+    if (!alb_search(&out->profile, &out->chi_square, &out->found, candidate, basis, &widened, error))
         return false;
     for (int iteration = 0; out->found && iteration < 12; iteration++) {
         double *fitted = alb_operator_readings(noise->forward, &out->profile, error);
@@ -139,7 +154,7 @@ static bool fit_with_discrepancy(fit *out, double *sd, alb_form form, const alb_
         out->discrepancy = discrepancy_of(readings, fitted, readings->count - parameters);
         widen(sd, readings, fitted, out->discrepancy);
         free(fitted);
-        if (!alb_search_polish(&out->profile, &out->chi_square, &widened, error))
+        if (!alb_search_polish(&out->profile, &out->chi_square, candidate, &widened, error))
             return false;
         if (fabs(out->discrepancy - before) < 1e-4 * before)
             break;
@@ -150,30 +165,53 @@ static bool fit_with_discrepancy(fit *out, double *sd, alb_form form, const alb_
     return true;
 }
 
-static bool choose_with_discrepancy(fit *chosen, double *sd, alb_outcome *outcome, const alb_basis *basis,
-                                    const alb_weighing *noise, double energy_sd, alb_error *error)
+// Whether the readings decide every parameter: full rank, and each known to better than half of itself; *which is the
+// first that is not, -1 where the rank is deficient.
+static bool decided(int *which, const alb_profile *profile, bool full_rank,
+                    double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX])
 {
-    fit fits[ALB_ATTEMPTS_MAX] = {{.found = false}};
-    int best = -1;
+    *which = -1;
+    for (int p = 0; full_rank && p < alb_form_parameter_count(profile->form); p++)
+        if (!(sqrt(covariance[p][p]) <= relative_sd_limit * fabs(profile->parameters[p]))) {
+            *which = p;
+            return false;
+        }
+    return full_rank;
+}
+
+static bool choose_with_discrepancy(int *chosen, fit fits[ALB_ATTEMPTS_MAX], double *sd, alb_outcome *outcome,
+                                    const alb_basis *basis, const alb_weighing *noise, double energy_sd,
+                                    alb_error *error)
+{
+    bool sure[ALB_ATTEMPTS_MAX] = {false};
+    int best = -1, which;
     for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
-        if (noise->readings->count < alb_form_parameter_count(candidates[f]) + 1)
+        fits[f] = (fit){.found = false};
+        if (noise->readings->count < alb_candidate_parameters(candidates[f]) + 1)
             continue;
+        const alb_weighing widened = {noise->readings, noise->forward, sd, energy_sd};
+        double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX];
+        bool full_rank;
         if (!fit_with_discrepancy(&fits[f], sd, candidates[f], basis, noise, energy_sd, error))
             return false;
-        if (fits[f].found && (best < 0 || fits[f].score < fits[best].score))
+        if (!fits[f].found)
+            continue;
+        if (!alb_search_covariance(covariance, &full_rank, &fits[f].profile, candidates[f], &widened, error))
+            return false;
+        sure[f] = decided(&which, &fits[f].profile, full_rank, covariance);
+        if (best < 0 || sure[f] > sure[best] || (sure[f] == sure[best] && fits[f].score < fits[best].score))
             best = f;
     }
     if (best < 0)
         return alb_fail(error, ALB_UNDECIDED,
                         "no sum of exponentials follows the readings: they do not fall with distance");
     for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
-        outcome->attempts[f].rejected[0] = '\0';
+        char *why = outcome->attempts[f].rejected;
         if (f != best && fits[f].found)
-            snprintf(outcome->attempts[f].rejected, ALB_REASON_SIZE,
-                     "no form fits within the noise; this one misses by %.3g relative, the chosen one by %.3g",
-                     fits[f].discrepancy, fits[best].discrepancy);
-        else if (f != best)
-            snprintf(outcome->attempts[f].rejected, ALB_REASON_SIZE, "no term of this sign lowers chi-square");
+            snprintf(why, ALB_REASON_SIZE, "no form fits within the noise; this one misses by %.3g relative%s",
+                     fits[f].discrepancy, sure[f] ? "" : " and its parameters are not decided");
+        else if (f == best)
+            *why = '\0';
     }
     // the widened sd of the best one are wanted, not those of the last
     double *fitted = alb_operator_readings(noise->forward, &fits[best].profile, error);
@@ -181,7 +219,7 @@ static bool choose_with_discrepancy(fit *chosen, double *sd, alb_outcome *outcom
         return false;
     widen(sd, noise->readings, fitted, fits[best].discrepancy);
     free(fitted);
-    *chosen = fits[best];
+    *chosen = best;
     return true;
 }
 
@@ -214,33 +252,32 @@ static void judge(alb_outcome *outcome, const alb_readings *readings, bool full_
     const alb_fitted *fitted = &outcome->fitted;
     const alb_profile *profile = &fitted->profile;
     char *why = outcome->undecided;
+    int which;
     if (!full_rank) {
         snprintf(why, ALB_REASON_SIZE, "the parameters of %s trade off fully: the Jacobian is rank-deficient",
                  alb_form_name(profile->form));
     } else if (!(outcome->measured_share >= measured_share_wanted)) {
         snprintf(why, ALB_REASON_SIZE, "%.0f %% of the total lies where nothing was measured (readings end at %.4g mm)",
                  100 * (1 - outcome->measured_share), readings->outer_mm);
-    } else {
-        for (int p = 0; p < alb_form_parameter_count(profile->form) && !*why; p++)
-            if (!(fitted->sd[p] <= relative_sd_limit * fabs(profile->parameters[p])))
-                snprintf(why, ALB_REASON_SIZE, "%s = %.4g +- %.2g: uncertain by more than half of itself",
-                         alb_form_parameter_name(profile->form, p), profile->parameters[p], fitted->sd[p]);
-        if (!*why && profile->parameters[1] * readings->outer_mm < 0.1)
-            snprintf(why, ALB_REASON_SIZE, "the slow term (%.3g per mm) does not decay within the readings (%.4g mm)",
-                     profile->parameters[1], readings->outer_mm);
+    } else if (!decided(&which, profile, full_rank, outcome->fitted.covariance)) {
+        snprintf(why, ALB_REASON_SIZE, "%s = %.4g +- %.2g: uncertain by more than half of itself",
+                 alb_form_parameter_name(profile->form, which), profile->parameters[which], fitted->sd[which]);
+    } else if (profile->parameters[1] * readings->outer_mm < 0.1) {
+        snprintf(why, ALB_REASON_SIZE, "the slow term (%.3g per mm) does not decay within the readings (%.4g mm)",
+                 profile->parameters[1], readings->outer_mm);
     }
     outcome->fitted.identifiable = !*why;
 }
 
-static bool complete(alb_outcome *outcome, const alb_readings *readings, const alb_weighing *weighing, double energy_sd,
-                     double relative_scale_sd, alb_error *error)
+static bool complete(alb_outcome *outcome, alb_candidate candidate, const alb_readings *readings,
+                     const alb_weighing *weighing, double energy_sd, double relative_scale_sd, alb_error *error)
 {
     alb_fitted *fitted = &outcome->fitted;
     const alb_profile *profile = &fitted->profile;
     const int n = alb_form_parameter_count(profile->form);
     bool full_rank;
     double gradient[ALB_PARAMETERS_MAX];
-    if (!alb_search_covariance(fitted->covariance, &full_rank, profile, weighing, error))
+    if (!alb_search_covariance(fitted->covariance, &full_rank, profile, candidate, weighing, error))
         return false;
     fitted->total = alb_profile_total_gradient(gradient, profile);
     const double beyond = fitted->total - 2 * M_PI * alb_profile_disc(profile, readings->outer_mm);
@@ -270,7 +307,7 @@ static bool complete(alb_outcome *outcome, const alb_readings *readings, const a
         }
     }
     free(model);
-    fitted->degrees_of_freedom = readings->count - n;
+    fitted->degrees_of_freedom = readings->count - alb_candidate_parameters(candidate);
     outcome->rms_relative = counted ? sqrt(squares / counted) : 0;
     describe_tail(outcome, readings);
     judge(outcome, readings, full_rank);
@@ -281,8 +318,9 @@ bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_op
                 double relative_scale_sd, alb_error *error)
 {
     bool ok = false, stands;
+    int chosen;
     alb_basis basis = {0};
-    fit fits[ALB_ATTEMPTS_MAX] = {{.found = false}}, widened = {.found = false};
+    fit fits[ALB_ATTEMPTS_MAX] = {{.found = false}};
     *outcome = (alb_outcome){0};
     if (readings->count < 3)
         return alb_fail(error, ALB_UNDECIDED, "%d readings do not decide between profiles; 3 at least",
@@ -297,18 +335,17 @@ bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_op
     alb_weighing weighing = {readings, forward, sd, 0};
     if (!fit_by_noise(fits, outcome, &basis, &weighing, error))
         goto done;
-    const int chosen = simplest(&stands, fits, outcome, readings->count);
-    if (stands) {
-        outcome->fitted.profile = fits[chosen].profile;
-    } else {
+    chosen = simplest(&stands, fits, outcome, readings->count);
+    if (!stands) {
         const alb_weighing noise = {readings, forward, readings->sd, 0};
-        if (!choose_with_discrepancy(&widened, sd, outcome, &basis, &noise, energy_sd, error))
+        if (!choose_with_discrepancy(&chosen, fits, sd, outcome, &basis, &noise, energy_sd, error))
             goto done;
-        outcome->fitted.profile = widened.profile;
-        outcome->discrepancy_relative = widened.discrepancy;
+        outcome->discrepancy_relative = fits[chosen].discrepancy;
         weighing.energy_sd = energy_sd;
     }
-    ok = complete(outcome, readings, &weighing, energy_sd, relative_scale_sd, error);
+    outcome->fitted.profile = fits[chosen].profile;
+    outcome->tied = candidates[chosen].tied;
+    ok = complete(outcome, candidates[chosen], readings, &weighing, energy_sd, relative_scale_sd, error);
 done:
     alb_basis_free(&basis);
     free(sd);

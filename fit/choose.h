@@ -2,10 +2,11 @@
 #pragma once
 #include "fit/operator.h"
 
-enum { ALB_ATTEMPTS_MAX = 3, ALB_REASON_SIZE = 320 };
+enum { ALB_ATTEMPTS_MAX = 4, ALB_REASON_SIZE = 320 };
 
 typedef struct alb_attempt {
     alb_form form;
+    bool tied;              // decay_2 held at 1.1 decay_1 (search.h)
     double chi_square, bic; // by the noise alone; NaN where the form was not fitted
     int degrees_of_freedom;
     char rejected[ALB_REASON_SIZE]; // empty: the one that was chosen
@@ -13,6 +14,7 @@ typedef struct alb_attempt {
 
 typedef struct alb_outcome {
     alb_fitted fitted;
+    bool tied; // three free parameters: the covariance is of rank 3
     alb_attempt attempts[ALB_ATTEMPTS_MAX];
     int attempt_count;
     double discrepancy_relative; // 0: the form fits within the noise

@@ -1,6 +1,7 @@
 // material.json: written by fit, read strictly by render.
 #include "base/record.h"
 #include "fit/measurement.h"
+#include "fit/search.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -35,6 +36,8 @@ static void put_attempts(alb_json *json, const alb_outcome *outcome)
         const alb_attempt *attempt = &outcome->attempts[i];
         alb_json_object(json, NULL);
         alb_json_string(json, "form", alb_form_name(attempt->form));
+        if (attempt->tied)
+            alb_json_number(json, "decay_ratio_held", ALB_TIED_RATIO);
         alb_json_number(json, "chi_square", attempt->chi_square);
         alb_json_integer(json, "degrees_of_freedom", attempt->degrees_of_freedom);
         alb_json_number(json, "bic", attempt->bic);
@@ -50,6 +53,8 @@ static void put_outcome(alb_json *json, const char *side, const alb_outcome *out
     const int n = alb_form_parameter_count(fitted->profile.form);
     alb_json_object(json, side);
     alb_json_string(json, "form", alb_form_name(fitted->profile.form));
+    if (outcome->tied)
+        alb_json_number(json, "decay_ratio_held", ALB_TIED_RATIO);
     alb_json_boolean(json, "identifiable", fitted->identifiable);
     if (!fitted->identifiable) {
         alb_json_boolean(json, "best_guess", true);
@@ -169,11 +174,11 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
     const char *form;
     long freedom;
     alb_node total;
-    if (!alb_node_allow(
-            node,
-            "form identifiable best_guess undecided parameters covariance total chi_square degrees_of_freedom "
-            "errors_from discrepancy_relative rms_relative measured_share_of_total tail_slope_per_mm tried",
-            error) ||
+    if (!alb_node_allow(node,
+                        "form decay_ratio_held identifiable best_guess undecided parameters covariance total "
+                        "chi_square degrees_of_freedom "
+                        "errors_from discrepancy_relative rms_relative measured_share_of_total tail_slope_per_mm tried",
+                        error) ||
         !alb_node_text(&form, node, "form", error))
         return false;
     if (!alb_form_from_name(&fitted->profile.form, form))

@@ -93,9 +93,9 @@ static void put_attempts(alb_page *page, const alb_fitting *fitting, alb_side si
     const alb_outcome *outcome = &fitting->sides[side][c].outcome;
     for (int i = 0; i < outcome->attempt_count; i++) {
         const alb_attempt *attempt = &outcome->attempts[i];
-        alb_page_row(page, "%s|%s|%s|%.5g|%.5g|%s", alb_side_names[side], fitting->material.channel_names[c],
-                     alb_form_name(attempt->form), attempt->chi_square, attempt->bic,
-                     *attempt->rejected ? attempt->rejected : "chosen");
+        alb_page_row(page, "%s|%s|%s%s|%.5g|%.5g|%s", alb_side_names[side], fitting->material.channel_names[c],
+                     alb_form_name(attempt->form), attempt->tied ? ", b2 = 1.1 b1" : "", attempt->chi_square,
+                     attempt->bic, *attempt->rejected ? attempt->rejected : "chosen");
     }
 }
 

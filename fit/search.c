@@ -3,7 +3,7 @@
 // Start: for every pair of decays on a logarithmic grid the amplitudes are a linear problem of two unknowns with the
 // signs the form wants (variable projection; Golub & Pereyra 1973); its Gram matrix is made once. The best few pairs
 // are polished by Levenberg-Marquardt (Ceres) in parameters that cannot break the form:
-//   positive: ln a1, ln b1, ln a2, ln b2        signed: ln a1, ln b1, s = -a2/a1 in 0..1, ln(b2/b1 - 1)
+//   positive: ln a1, ln b1, ln a2, ln b2        signed: ln a1, ln b1, s = -a2/a1 in 0..1, ln(b2/b1 - 1), b2/b1 >= 1.1
 // Logarithms and whitening make the answer independent of the units. b1 < b2 in both.
 // Covariance: (J^T J)^-1 in the form's own parameters, J whitened, scaled to unit diagonal before it is inverted. It is
 // the linear approximation: too small where the decays come close (b2/b1 below about 1.5 at 1 % noise).
@@ -16,6 +16,11 @@
 #include <string.h>
 
 enum { STARTS = 5, PARAMETERS = 4 };
+
+int alb_candidate_parameters(alb_candidate candidate)
+{
+    return alb_form_parameter_count(candidate.form) - candidate.tied;
+}
 
 double alb_energy(const alb_readings *readings, const double *value)
 {
@@ -34,12 +39,13 @@ bool alb_basis_create(alb_basis *basis, const alb_readings *readings, const alb_
     const double low = 0.1 / readings->outer_mm, high = fmin(10 / nearest, 1e6 * low);
     const int count = (int)fmax(ceil(4 * log(high / low)), 24);
     *basis = (alb_basis){.count = count};
-    basis->decay_per_mm = alb_allocate((size_t)count, sizeof(double), error);
-    basis->readings = alb_allocate((size_t)count * (size_t)readings->count, sizeof(double), error);
+    basis->decay_per_mm = alb_allocate(2 * (size_t)count, sizeof(double), error);
+    basis->readings = alb_allocate(2 * (size_t)count * (size_t)readings->count, sizeof(double), error);
     double *on_grid = alb_allocate((size_t)forward->grid_count, sizeof(double), error);
     const bool ok = basis->decay_per_mm && basis->readings && on_grid;
-    for (int j = 0; ok && j < count; j++) {
-        basis->decay_per_mm[j] = low * pow(high / low, j / (double)(count - 1));
+    for (int j = 0; ok && j < 2 * count; j++) {
+        basis->decay_per_mm[j] =
+            low * pow(high / low, (j % count) / (double)(count - 1)) * (j < count ? 1 : ALB_TIED_RATIO);
         for (int k = 0; k < forward->grid_count; k++)
             on_grid[k] = exp(-basis->decay_per_mm[j] * forward->grid_mm[k]);
         alb_operator_apply(basis->readings + (size_t)j * (size_t)readings->count, forward, on_grid);
@@ -60,15 +66,15 @@ void alb_basis_free(alb_basis *basis)
 // Whitened model and its derivatives by the form's own parameters: values[0] the model, values[1 + p] the derivatives.
 typedef struct model {
     const alb_weighing *weighing;
-    alb_form form;
+    alb_candidate candidate;
     double *on_grid[1 + PARAMETERS], *values[1 + PARAMETERS];
     double *block;
 } model;
 
-static bool model_create(model *out, alb_form form, const alb_weighing *weighing, alb_error *error)
+static bool model_create(model *out, alb_candidate candidate, const alb_weighing *weighing, alb_error *error)
 {
     const size_t grid = (size_t)weighing->forward->grid_count, rows = (size_t)weighing->readings->count + 1;
-    *out = (model){.weighing = weighing, .form = form};
+    *out = (model){.weighing = weighing, .candidate = candidate};
     out->block = alb_allocate((1 + PARAMETERS) * (grid + rows), sizeof(double), error);
     for (size_t p = 0; out->block && p < 1 + PARAMETERS; p++) {
         out->on_grid[p] = out->block + p * (grid + rows);
@@ -110,21 +116,22 @@ static double whitened_reading(const alb_weighing *weighing, int i)
 }
 
 // The form's parameters from the solver's, and the derivatives d form[i] / d solver[j].
-static alb_profile profile_of(double jacobian[PARAMETERS][PARAMETERS], alb_form form, const double *u)
+static alb_profile profile_of(double jacobian[PARAMETERS][PARAMETERS], alb_candidate candidate, const double *u)
 {
-    alb_profile profile = {.form = form};
+    alb_profile profile = {.form = candidate.form};
     double *p = profile.parameters, (*j)[PARAMETERS] = jacobian;
     memset(jacobian, 0, sizeof(double[PARAMETERS][PARAMETERS]));
     p[0] = j[0][0] = exp(u[0]);
     p[1] = j[1][1] = exp(u[1]);
-    if (form == ALB_FORM_TWO_EXPONENTIALS) {
+    if (candidate.form == ALB_FORM_TWO_EXPONENTIALS) {
         p[2] = j[2][2] = exp(u[2]);
         p[3] = j[3][3] = exp(u[3]);
-    } else if (form == ALB_FORM_SIGNED_EXPONENTIALS) {
+    } else if (candidate.form == ALB_FORM_SIGNED_EXPONENTIALS) {
+        const double excess = candidate.tied ? ALB_TIED_RATIO - 1 : exp(u[3]); // of b2 over b1
         p[2] = j[2][0] = -u[2] * p[0];
         j[2][2] = -p[0];
-        p[3] = j[3][1] = p[1] * (1 + exp(u[3]));
-        j[3][3] = p[1] * exp(u[3]);
+        p[3] = j[3][1] = p[1] * (1 + excess);
+        j[3][3] = candidate.tied ? 0 : p[1] * excess;
     }
     return profile;
 }
@@ -142,16 +149,17 @@ static void evaluate(double *residuals, double *jacobian, const double *u, const
 {
     const model *m = context;
     double chain[PARAMETERS][PARAMETERS];
-    const alb_profile profile = profile_of(chain, m->form, u);
+    const alb_profile profile = profile_of(chain, m->candidate, u);
     model_evaluate((model *)m, &profile);
-    const int parameters = alb_form_parameter_count(m->form), rows = residual_count(m->weighing);
+    const int all = alb_form_parameter_count(m->candidate.form), rows = residual_count(m->weighing);
+    const int free_parameters = alb_candidate_parameters(m->candidate);
     for (int i = 0; i < rows; i++) {
         residuals[i] = m->values[0][i] - whitened_reading(m->weighing, i);
-        for (int q = 0; jacobian && q < parameters; q++) {
+        for (int q = 0; jacobian && q < free_parameters; q++) {
             double sum = 0;
-            for (int p = 0; p < parameters; p++)
+            for (int p = 0; p < all; p++)
                 sum += m->values[1 + p][i] * chain[p][q];
-            jacobian[i * parameters + q] = sum;
+            jacobian[i * free_parameters + q] = sum;
         }
     }
 }
@@ -165,10 +173,11 @@ static void order_terms(alb_profile *profile)
     p[0] = p[2], p[1] = p[3], p[2] = a, p[3] = b;
 }
 
-bool alb_search_polish(alb_profile *profile, double *chi_square, const alb_weighing *weighing, alb_error *error)
+bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate candidate, const alb_weighing *weighing,
+                       alb_error *error)
 {
     model m;
-    if (!model_create(&m, profile->form, weighing, error))
+    if (!model_create(&m, candidate, weighing, error))
         return false;
     double top = 0, u[PARAMETERS], lower[PARAMETERS], upper[PARAMETERS], chain[PARAMETERS][PARAMETERS];
     for (int i = 0; i < weighing->readings->count; i++)
@@ -182,14 +191,14 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, const alb_weigh
     }
     if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS) {
         lower[2] = 0, upper[2] = 1;
-        lower[3] = log(1e-2), upper[3] = log(1e7);
+        lower[3] = log(ALB_TIED_RATIO - 1), upper[3] = log(1e7);
     }
-    const int parameters = alb_form_parameter_count(profile->form);
+    const int parameters = alb_candidate_parameters(candidate);
     for (int p = 0; p < parameters; p++)
         u[p] = fmin(fmax(u[p], lower[p]), upper[p]);
     const alb_problem problem = {parameters, residual_count(weighing), evaluate, &m, lower, upper};
     const bool ok = alb_solve(u, chi_square, &problem, error);
-    *profile = profile_of(chain, profile->form, u);
+    *profile = profile_of(chain, candidate, u);
     order_terms(profile);
     free(m.block);
     return ok;
@@ -251,59 +260,59 @@ static double whitened_basis(const alb_basis *basis, const alb_weighing *weighin
     return i < n ? column[i] / weighing->sd[i] : alb_energy(weighing->readings, column) / weighing->energy_sd;
 }
 
-static bool find_starts(start *best, int *count, alb_form form, const alb_basis *basis, const alb_weighing *weighing,
-                        alb_error *error)
+static bool find_starts(start *best, int *count, alb_candidate candidate, const alb_basis *basis,
+                        const alb_weighing *weighing, alb_error *error)
 {
-    const int rows = residual_count(weighing), m = basis->count;
-    double *columns = alb_allocate((size_t)m * (size_t)rows, sizeof(double), error);
-    double *right = alb_allocate((size_t)m, sizeof(double), error);
+    const int rows = residual_count(weighing), m = basis->count, all = 2 * m;
+    double *columns = alb_allocate((size_t)all * (size_t)rows, sizeof(double), error);
+    double *right = alb_allocate((size_t)all, sizeof(double), error);
     *count = 0;
     if (!columns || !right) {
         free(columns);
         free(right);
         return false;
     }
-    for (int j = 0; j < m; j++)
+    for (int j = 0; j < all; j++)
         for (int i = 0; i < rows; i++) {
             columns[j * rows + i] = whitened_basis(basis, weighing, j, i);
             right[j] += columns[j * rows + i] * whitened_reading(weighing, i);
         }
     for (int i = 0; i < m; i++)
-        for (int j = i; j < m; j++) {
-            const bool single = form == ALB_FORM_EXPONENTIAL;
-            if (single != (i == j))
+        for (int j = i; j < all; j++) {
+            const bool single = candidate.form == ALB_FORM_EXPONENTIAL;
+            if (candidate.tied ? j != i + m : j >= m || single != (i == j))
                 continue;
             double g11 = 0, g12 = 0, g22 = 0;
             for (int k = 0; k < rows; k++) {
                 const double x = columns[i * rows + k], y = columns[j * rows + k];
                 g11 += x * x, g12 += x * y, g22 += y * y;
             }
-            start candidate = {.i = i, .j = j};
-            if (amplitudes(&candidate, form, g11, g12, g22, right[i], right[j]))
-                keep(best, count, candidate);
+            start pair = {.i = i, .j = j};
+            if (amplitudes(&pair, candidate.form, g11, g12, g22, right[i], right[j]))
+                keep(best, count, pair);
         }
     free(columns);
     free(right);
     return true;
 }
 
-bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_form form, const alb_basis *basis,
+bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_candidate candidate, const alb_basis *basis,
                 const alb_weighing *weighing, alb_error *error)
 {
     start best[STARTS];
     int count;
     *found = false;
     *chi_square = INFINITY;
-    if (!find_starts(best, &count, form, basis, weighing, error))
+    if (!find_starts(best, &count, candidate, basis, weighing, error))
         return false;
     for (int k = 0; k < count; k++) {
-        alb_profile candidate = {
-            form, {best[k].a1, basis->decay_per_mm[best[k].i], best[k].a2, basis->decay_per_mm[best[k].j]}};
+        alb_profile tried = {candidate.form,
+                             {best[k].a1, basis->decay_per_mm[best[k].i], best[k].a2, basis->decay_per_mm[best[k].j]}};
         double reached;
-        if (!alb_search_polish(&candidate, &reached, weighing, error))
+        if (!alb_search_polish(&tried, &reached, candidate, weighing, error))
             return false;
         if (reached < *chi_square) {
-            *profile = candidate;
+            *profile = tried;
             *chi_square = reached;
             *found = true;
         }
@@ -342,31 +351,45 @@ static bool invert(double matrix[PARAMETERS][PARAMETERS], int n)
 }
 
 bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX], bool *full_rank,
-                           const alb_profile *profile, const alb_weighing *weighing, alb_error *error)
+                           const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing,
+                           alb_error *error)
 {
     model m;
-    if (!model_create(&m, profile->form, weighing, error))
+    if (!model_create(&m, candidate, weighing, error))
         return false;
     model_evaluate(&m, profile);
-    const int n = alb_form_parameter_count(profile->form), rows = residual_count(weighing);
-    double matrix[PARAMETERS][PARAMETERS] = {{0}}, scale[PARAMETERS];
+    const int all = alb_form_parameter_count(profile->form), n = alb_candidate_parameters(candidate);
+    const int rows = residual_count(weighing);
+    // own[p][q]: derivative of the form's parameter p by the free parameter q (a1, b1, a2, and b2 where it is free)
+    double own[PARAMETERS][PARAMETERS] = {{0}}, matrix[PARAMETERS][PARAMETERS] = {{0}}, scale[PARAMETERS] = {0};
+    for (int p = 0; p < all; p++)
+        own[p][p] = p < n;
+    if (candidate.tied)
+        own[3][1] = ALB_TIED_RATIO;
+    for (int i = 0; i < rows; i++) {
+        double row[PARAMETERS] = {0};
+        for (int q = 0; q < n; q++)
+            for (int p = 0; p < all; p++)
+                row[q] += m.values[1 + p][i] * own[p][q];
+        for (int p = 0; p < n; p++)
+            for (int q = 0; q < n; q++)
+                matrix[p][q] += row[p] * row[q];
+    }
+    free(m.block);
     *full_rank = true;
     for (int p = 0; p < n; p++) {
-        double sum = 0;
-        for (int i = 0; i < rows; i++)
-            sum += m.values[1 + p][i] * m.values[1 + p][i];
-        scale[p] = sqrt(sum);
+        scale[p] = sqrt(matrix[p][p]);
         *full_rank &= scale[p] > 0 && isfinite(scale[p]);
     }
     for (int p = 0; *full_rank && p < n; p++)
         for (int q = 0; q < n; q++)
-            for (int i = 0; i < rows; i++)
-                matrix[p][q] += m.values[1 + p][i] / scale[p] * (m.values[1 + q][i] / scale[q]);
+            matrix[p][q] = matrix[p][q] / scale[p] / scale[q];
     *full_rank = *full_rank && invert(matrix, n);
     memset(covariance, 0, sizeof(double[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX]));
-    for (int p = 0; *full_rank && p < n; p++)
-        for (int q = 0; q < n; q++)
-            covariance[p][q] = matrix[p][q] / scale[p] / scale[q];
-    free(m.block);
+    for (int p = 0; *full_rank && p < all; p++)
+        for (int q = 0; q < all; q++)
+            for (int k = 0; k < n; k++)
+                for (int l = 0; l < n; l++)
+                    covariance[p][q] += own[p][k] * own[q][l] * matrix[k][l] / scale[k] / scale[l];
     return true;
 }

@@ -11,11 +11,22 @@ typedef struct alb_weighing {
     double energy_sd; // of sum value * area; 0: the energy is not a reading of its own
 } alb_weighing;
 
-// Readings of e^(-b r) on a grid of decays, computed once for all forms.
+// A form as it is fitted. Tied: signed exponentials with b2 = ALB_TIED_RATIO b1, three parameters. As b2 comes close to
+// b1 the pair tends to (A + B r) e^(-b r) and its amplitudes grow without bound while S stays: the tied pair stands for
+// all of those, which no data can tell apart, and says what the transmission of a thick slab looks like in three
+// numbers.
+typedef struct alb_candidate {
+    alb_form form;
+    bool tied;
+} alb_candidate;
+#define ALB_TIED_RATIO 1.1
+int alb_candidate_parameters(alb_candidate candidate); // free ones
+
+// Readings of e^(-b r) on a grid of decays, computed once for all forms; those of ALB_TIED_RATIO b behind them.
 typedef struct alb_basis {
-    int count;
-    double *decay_per_mm;
-    double *readings; // count x readings
+    int count;            // of the grid
+    double *decay_per_mm; // 2 count
+    double *readings;     // 2 count x readings
 } alb_basis;
 
 bool alb_basis_create(alb_basis *basis, const alb_readings *readings, const alb_operator *forward, alb_error *error);
@@ -23,13 +34,15 @@ void alb_basis_free(alb_basis *basis);
 
 // *found false where no second term of the wanted sign lowers chi-square (the form collapses to one exponential).
 // *chi_square is over the readings and, where it has an sd, the energy.
-bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_form form, const alb_basis *basis,
+bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_candidate candidate, const alb_basis *basis,
                 const alb_weighing *weighing, alb_error *error);
 // From the profile given to the nearest minimum.
-bool alb_search_polish(alb_profile *profile, double *chi_square, const alb_weighing *weighing, alb_error *error);
-// Inverse of J^T J in the form's own parameters; *full_rank false (and zeros) where the scaled matrix cannot be
-// inverted.
+bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate candidate, const alb_weighing *weighing,
+                       alb_error *error);
+// Inverse of J^T J in the form's own parameters (of rank 3 where the pair is tied); *full_rank false (and zeros) where
+// the scaled matrix cannot be inverted.
 bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX], bool *full_rank,
-                           const alb_profile *profile, const alb_weighing *weighing, alb_error *error);
+                           const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing,
+                           alb_error *error);
 // sum value * area, of any readings.
 double alb_energy(const alb_readings *readings, const double *value);

@@ -66,7 +66,7 @@ typedef struct alb_material_check {
     int count;
 } alb_material_check;
 
-// Every side and channel of the truth file, in its order. ALB_BAD_DATA where the files have no channel in common.
+// Every side and channel of the truth file: reflection first. ALB_BAD_DATA where the files have no channel in common.
 bool alb_compare_material(alb_material_check *check, const alb_material *material, const char *truth_path,
                           alb_error *error);
 void alb_material_check_free(alb_material_check *check);

@@ -107,20 +107,22 @@ static void check_profile(alb_profile_check *p, const alb_material *material)
     measure_curve(p);
 }
 
-static bool read_channel(alb_material_check *out, const char *name, alb_node channel, const alb_material *material,
-                         alb_error *error)
+// One side of every channel that has it.
+static bool read_side(alb_material_check *out, alb_side side, alb_node channels, const alb_material *material,
+                      alb_error *error)
 {
-    if (!alb_node_allow(channel, "reflection transmission", error))
-        return false;
-    for (int side = 0; side < ALB_SIDES; side++) {
-        alb_node node;
+    for (size_t i = 0; i < alb_node_key_count(channels); i++) {
+        alb_node channel, node;
+        if (!alb_node_object(&channel, channels, alb_node_key(channels, i), error) ||
+            !alb_node_allow(channel, "reflection transmission", error))
+            return false;
         if (!alb_node_has(channel, alb_side_names[side]))
             continue;
         if (!alb_node_object(&node, channel, alb_side_names[side], error))
             return false;
         alb_profile_check *p = &out->profiles[out->count++];
-        p->side = (alb_side)side;
-        snprintf(p->channel, sizeof p->channel, "%.7s", name);
+        p->side = side;
+        snprintf(p->channel, sizeof p->channel, "%.7s", alb_node_key(channels, i));
         if (!read_profile(p, node, error))
             return false;
         check_profile(p, material);
@@ -132,7 +134,7 @@ bool alb_compare_material(alb_material_check *check, const alb_material *materia
                           alb_error *error)
 {
     alb_material_check out = {0};
-    alb_node root, channels, channel;
+    alb_node root, channels;
     int measured = 0;
     alb_record *record = alb_record_read(truth_path, error);
     bool ok = record && alb_record_root(&root, record, error) &&
@@ -140,10 +142,8 @@ bool alb_compare_material(alb_material_check *check, const alb_material *materia
               alb_node_object(&channels, root, "channels", error);
     if (ok && alb_node_key_count(channels) > 3)
         ok = alb_node_fail(error, channels, NULL, "%zu channels; expected at most 3", alb_node_key_count(channels));
-    for (size_t i = 0; ok && i < alb_node_key_count(channels); i++) {
-        const char *name = alb_node_key(channels, i);
-        ok = alb_node_object(&channel, channels, name, error) && read_channel(&out, name, channel, material, error);
-    }
+    for (int side = 0; ok && side < ALB_SIDES; side++)
+        ok = read_side(&out, (alb_side)side, channels, material, error);
     for (int i = 0; i < out.count; i++)
         measured += out.profiles[i].measured;
     if (ok && measured == 0)
@@ -189,6 +189,15 @@ static void add_table(alb_page *page, const alb_material_check *check)
               "0.5 mm to the first bin whose own sd exceeds 10 %%.");
 }
 
+// Bins up to the last one that the photons know to half its value: what lies beyond is noise.
+static size_t bins_to_show(const alb_profile_check *p)
+{
+    size_t count = p->count;
+    while (count > 0 && !(p->value_per_mm2[count - 1] > 2 * p->sd_per_mm2[count - 1]))
+        count--;
+    return count;
+}
+
 // Truth as points with sd and the fit as a line, in one panel a side.
 static bool add_plot(alb_page *page, const alb_material_check *check, const char *path, alb_error *error)
 {
@@ -204,22 +213,22 @@ static bool add_plot(alb_page *page, const alb_material_check *check, const char
         return false;
     for (int i = 0; i < check->count; i++) {
         const alb_profile_check *p = &check->profiles[i];
-        const size_t k = counts[p->side];
+        const size_t k = counts[p->side], shown = bins_to_show(p);
         snprintf(labels[i], sizeof labels[i], "%s photons \u00b1 sd", p->channel);
         curves[p->side][k] = (alb_curve){.label = labels[i],
                                          .colour = colours[k / 2],
                                          .x = p->r_mm,
                                          .y = p->value_per_mm2,
                                          .sd = p->sd_per_mm2,
-                                         .count = p->count,
+                                         .count = shown,
                                          .mark = ALB_MARK_POINTS};
-        for (size_t b = 0; b < p->count; b++)
+        for (size_t b = 0; b < shown; b++)
             fit[used + b] = p->measured ? alb_profile_value(&p->fitted.profile, p->r_mm[b]) : (double)NAN;
         curves[p->side][k + 1] = (alb_curve){.label = p->measured ? "fit" : NULL,
                                              .colour = colours[k / 2],
                                              .x = p->r_mm,
                                              .y = fit + used,
-                                             .count = p->count,
+                                             .count = shown,
                                              .mark = ALB_MARK_LINE};
         counts[p->side] += 2;
         used += p->count;
@@ -232,10 +241,12 @@ static bool add_plot(alb_page *page, const alb_material_check *check, const char
                                    .curves = curves[side],
                                    .curve_count = counts[side],
                                    .height = 1};
-    const bool ok =
-        alb_plot_write(path, panels, ALB_SIDES, 900, 720, error) &&
-        alb_page_picture(page, path, "Radiant exitance per incident flux: what the photons did and what was fitted",
-                         error);
+    const bool ok = alb_plot_write(path, panels, ALB_SIDES, 900, 720, error) &&
+                    alb_page_picture(page, path,
+                                     "Radiant exitance per incident flux: what the photons did, as far as they know it "
+                                     "to half its value, and what "
+                                     "was fitted",
+                                     error);
     free(fit);
     return ok;
 }

@@ -41,7 +41,8 @@ static int taken(alb_form form, const alb_profile *truth, double noise, int tria
         choose(&outcome, &readings, 0);
         count += outcome.fitted.profile.form == form;
         for (int i = 0; i < outcome.attempt_count; i++)
-            assert_true((outcome.attempts[i].form == outcome.fitted.profile.form) == !*outcome.attempts[i].rejected);
+            assert_true((outcome.attempts[i].form == outcome.fitted.profile.form &&
+                         outcome.attempts[i].tied == outcome.tied) == !*outcome.attempts[i].rejected);
         alb_readings_free(&readings);
     }
     return count;
@@ -64,6 +65,32 @@ static void as_much_as_needed(void **state)
     const alb_profile flat = {ALB_FORM_SIGNED_EXPONENTIALS, {2, 0.5, -1, 1}}; // a1 b1 + a2 b2 = 0: flat at r = 0
     assert_int_equal(taken(ALB_FORM_TWO_EXPONENTIALS, &two, 0.03, 60), 60);
     assert_int_equal(taken(ALB_FORM_SIGNED_EXPONENTIALS, &flat, 0.03, 60), 60);
+}
+
+// Decays that coincide, S = (1 + r) e^(-r), the transmission of a thick slab: the tied pair stands for it, decided.
+static void coinciding_decays(void **state)
+{
+    (void)state;
+    for (unsigned t = 0; t < 60; t++) {
+        alb_error error = {0};
+        alb_random random = alb_random_at(6, 0, t);
+        alb_readings readings = {0};
+        alb_outcome outcome;
+        check_ok(alb_readings_create(&readings, READINGS, &error), &error);
+        for (int i = 0; i < READINGS; i++) {
+            const double step = 0.1, r = step * (i + 0.5), value = (1 + r) * exp(-r);
+            readings.r_mm[i] = r;
+            readings.sd[i] = 0.02 * hypot(value, 0.01);
+            readings.value[i] = value + readings.sd[i] * alb_random_normal(&random);
+            readings.area_mm2[i] = 2 * M_PI * r * step;
+            readings.outer_mm = r;
+        }
+        choose(&outcome, &readings, 0);
+        assert_int_equal(outcome.fitted.profile.form, ALB_FORM_SIGNED_EXPONENTIALS);
+        assert_true(outcome.tied && outcome.fitted.identifiable);
+        check_near(outcome.fitted.total, 6 * M_PI, 4.5 * outcome.fitted.total_sd); // 2 pi (1 + 2)
+        alb_readings_free(&readings);
+    }
 }
 
 // With data of a form, neither the choice nor the energy moves the total; the sd of the scale is added once.
@@ -112,7 +139,8 @@ static void energy_is_kept_where_no_form_fits(void **state)
                       outcome.fitted.total, outcome.fitted.total_sd, alb_profile_total(&truth),
                       100 * (outcome.fitted.total / alb_profile_total(&truth) - 1));
         assert_true(outcome.discrepancy_relative > 0.01);
-        check_relative(outcome.fitted.total, alb_profile_total(&truth), 0.02); // what the demonstration promises
+        // without the energy as a reading these end at -0.8 and -1.2 %: half of the smaller tells the two apart
+        check_relative(outcome.fitted.total, alb_profile_total(&truth), 0.006);
         check_near(outcome.fitted.total, alb_profile_total(&truth), 4 * outcome.fitted.total_sd);
         alb_readings_free(&readings);
     }
@@ -217,9 +245,12 @@ static void pictures_to_totals(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_more_than_needed), cmocka_unit_test(as_much_as_needed),
-        cmocka_unit_test(totals_are_honest),   cmocka_unit_test(energy_is_kept_where_no_form_fits),
-        cmocka_unit_test(undecided),           cmocka_unit_test(pictures_to_totals)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(no_more_than_needed),
+                                       cmocka_unit_test(as_much_as_needed),
+                                       cmocka_unit_test(coinciding_decays),
+                                       cmocka_unit_test(totals_are_honest),
+                                       cmocka_unit_test(energy_is_kept_where_no_form_fits),
+                                       cmocka_unit_test(undecided),
+                                       cmocka_unit_test(pictures_to_totals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -48,8 +48,9 @@ static bool search(alb_profile *found, double *chi_square, alb_form form, const 
     check_ok(alb_operator_identity(&forward, readings, &error), &error);
     check_ok(alb_basis_create(&basis, readings, &forward, &error), &error);
     const alb_weighing weighing = {readings, &forward, readings->sd, 0};
-    check_ok(alb_search(found, chi_square, &any, form, &basis, &weighing, &error), &error);
-    check_ok(alb_search_covariance(covariance, &full_rank, found, &weighing, &error), &error);
+    check_ok(alb_search(found, chi_square, &any, (alb_candidate){form, false}, &basis, &weighing, &error), &error);
+    check_ok(alb_search_covariance(covariance, &full_rank, found, (alb_candidate){form, false}, &weighing, &error),
+             &error);
     alb_basis_free(&basis);
     alb_operator_free(&forward);
     return any && full_rank;
@@ -152,7 +153,9 @@ static void rank_deficiency_is_seen(void **state)
     make(&readings, &truth, 12, 0.01, 1, &random);
     check_ok(alb_operator_identity(&forward, &readings, &error), &error);
     const alb_weighing weighing = {&readings, &forward, readings.sd, 0};
-    check_ok(alb_search_covariance(covariance, &full_rank, &twin, &weighing, &error), &error);
+    check_ok(alb_search_covariance(covariance, &full_rank, &twin, (alb_candidate){ALB_FORM_TWO_EXPONENTIALS, false},
+                                   &weighing, &error),
+             &error);
     assert_false(full_rank);
     alb_operator_free(&forward);
     alb_readings_free(&readings);

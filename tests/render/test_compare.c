@@ -95,6 +95,18 @@ static void known_difference_by_hand(void **state)
     free_all(&photo, &render, &c);
 }
 
+static void peak_is_the_percentile_of_compared_values(void **state)
+{
+    (void)state;
+    alb_image photo = filled(100, 20, "Y", NAN);
+    for (int i = 0; i < 1000; i++)
+        photo.pixels[2 * i] = (float)(1 + (i * 7) % 1000); // 1 ... 1000, each once
+    alb_comparison c = compared(&photo, &photo, NULL);
+    check_near(c.peak, 999, 0); // 999 of the 1000 are at or below
+    alb_image none = {0};
+    free_all(&photo, &none, &c);
+}
+
 // OpenCV's own constants and window are trusted; that a constant offset costs what the formula says is not.
 static void ssim_of_two_flat_pictures(void **state)
 {
@@ -354,6 +366,7 @@ int main(void)
         cmocka_unit_test(identical_pictures_are_identical),
         cmocka_unit_test(scale_is_recovered_also_per_channel),
         cmocka_unit_test(known_difference_by_hand),
+        cmocka_unit_test(peak_is_the_percentile_of_compared_values),
         cmocka_unit_test(ssim_of_two_flat_pictures),
         cmocka_unit_test(masks_and_bad_pixels_are_left_out_and_counted),
         cmocka_unit_test(ssim_is_not_flattered_by_a_mask),
