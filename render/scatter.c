@@ -5,10 +5,11 @@
 //     self and near       the exact integral over the source triangle (scatter_triangle.c); near: the centroids are
 //     less than
 //                         2.5 longest edges of the source apart
-//     far                 A_i s(|c_j - c_i|), s from a table of 16,384 entries over the body's diagonal D, linear: relative
+//     far                 A_i s(|c_j - c_i|), s from a table of 16,384 entries over the body's diagonal D, linear:
+//     relative
 //                         error (b D / 16384)^2 / 8 for exp(-b r), 1e-5 at b D = 150. The centroid rule itself lacks
-//                         (b h)^2 / 48 of each pair, h the longest edge; with the share (1 + 2.5 b h) exp(-2.5 b h) that is
-//                         far, a row sum falls short by 0.6 % at worst (b h = 1), 0.1 % at b h = 0.25
+//                         (b h)^2 / 48 of each pair, h the longest edge; with the share (1 + 2.5 b h) exp(-2.5 b h)
+//                         that is far, a row sum falls short by 0.6 % at worst (b h = 1), 0.1 % at b h = 0.25
 // Distances are straight lines: exact inside a convex body, too short otherwise (closed, convex: the caller warns).
 // Slab: the two faces are the patches whose normal lies within 10 degrees of the direction that carries most area.
 // Between the faces the transmission profile acts at the lateral distance; on one face the reflection profile; from and
@@ -76,7 +77,10 @@ static void exact_pair(double weight[3], const alb_scatter_body *body, const alb
         for (int k = 0; k < 3; k++)
             triangle[k] = alb_add(triangle[k], alb_times(alb_dot(axis, alb_sub(p, triangle[k])), axis));
     }
-    alb_scatter_triangle(weight, surface->profiles[side], triangle, p);
+    if (distance2_between(body, j, i) > 0.25f * body->near2_mm2[i]) // 1.25 longest edges
+        alb_scatter_triangle_from_afar(weight, surface->profiles[side], triangle, p);
+    else
+        alb_scatter_triangle(weight, surface->profiles[side], triangle, p);
     for (int c = 0; c < 3; c++)
         weight[c] = fmax(0, weight[c]); // quadrature noise where the profile has died away
 }

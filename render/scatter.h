@@ -53,3 +53,6 @@ size_t alb_scatter_bytes(const alb_scatter *scatter);
 // Integral of S(|x - p|) over the triangle for three profiles, 1 = all that leaves the plane at most.
 void alb_scatter_triangle(double integral[3], const alb_profile profiles[3], const alb_vector triangle[3],
                           alb_vector p);
+// The same by seven points, for p further from the triangle's middle than 1.25 of its longest edge.
+void alb_scatter_triangle_from_afar(double integral[3], const alb_profile profiles[3], const alb_vector triangle[3],
+                                    alb_vector p);

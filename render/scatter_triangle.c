@@ -7,6 +7,9 @@
 // turns over within a step of about one, however narrow it is and however close the foot lies to the edge, so that
 // Gauss-Legendre with eight points on panels of at most 1.5 holds for triangles of any shape. For p anywhere: inside,
 // outside or above.
+//
+// Away from the triangle the profile is smooth over it, and seven points that are exact to degree five (Radon 1948) do:
+// from 1.25 longest edges on within 1e-4 of the integral where S turns over in no less than a third of an edge.
 #include "render/scatter.h"
 
 static const double nodes[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
@@ -44,5 +47,26 @@ void alb_scatter_triangle(double integral[3], const alb_profile profiles[3], con
         if (d > 1e-12 * alb_length(alb_sub(b, a))) // else seen edge-on: no angle
             add_edge(integral, profiles, at_foot, height * height, signed_d, asinh(alb_dot(along, a) / d),
                      asinh(alb_dot(along, b) / d));
+    }
+}
+
+void alb_scatter_triangle_from_afar(double integral[3], const alb_profile profiles[3], const alb_vector triangle[3],
+                                    alb_vector p)
+{
+    static const double shares_of[3] = {0.225, 0.132394152788506, 0.125939180544827};
+    static const double own[3] = {1.0 / 3, 0.059715871789770,
+                                  0.797426985353087}; // weight of one corner, the others alike
+    const double area =
+        0.5 * alb_length(alb_cross(alb_sub(triangle[1], triangle[0]), alb_sub(triangle[2], triangle[0])));
+    const alb_vector sum = alb_add(triangle[0], alb_add(triangle[1], triangle[2]));
+    for (int c = 0; c < 3; c++)
+        integral[c] = 0;
+    for (int k = 0; k < 7; k++) {
+        const int ring = (k + 2) / 3, corner = (k + 2) % 3; // the middle, then two rings of three
+        const double other = 0.5 * (1 - own[ring]);
+        const alb_vector x = alb_add(alb_times(other, sum), alb_times(own[ring] - other, triangle[corner]));
+        const double distance = alb_length(alb_sub(x, p));
+        for (int c = 0; c < 3; c++)
+            integral[c] += area * shares_of[ring] * alb_profile_value(&profiles[c], distance);
     }
 }

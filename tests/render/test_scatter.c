@@ -76,6 +76,30 @@ static void triangle_integral_is_exact(void **state)
     }
 }
 
+// The seven-point rule beyond 1.25 longest edges, for profiles that turn over in a third of an edge or more.
+static void far_triangles_need_seven_points(void **state)
+{
+    (void)state;
+    for (uint64_t i = 0; i < 200; i++) {
+        alb_random random = alb_random_at(12, 0, i);
+        alb_vector v[4];
+        double longest = 0, points[3], exact[3];
+        for (int k = 0; k < 3; k++)
+            v[k] = (alb_vector){4 * alb_random_uniform(&random), 4 * alb_random_uniform(&random), 0};
+        for (int k = 0; k < 3; k++)
+            longest = fmax(longest, alb_length(alb_sub(v[k], v[(k + 1) % 3])));
+        const double angle = 2 * M_PI * alb_random_uniform(&random),
+                     distance = (1.25 + alb_random_uniform(&random)) * longest;
+        v[3] = alb_add(alb_times(1.0 / 3, alb_add(v[0], alb_add(v[1], v[2]))),
+                       (alb_vector){distance * cos(angle), distance * sin(angle), 0});
+        const alb_profile profiles[3] = {{ALB_FORM_EXPONENTIAL, {1, 3 / longest}}, one, marble};
+        alb_scatter_triangle(exact, profiles, v, v[3]);
+        alb_scatter_triangle_from_afar(points, profiles, v, v[3]);
+        for (int c = 0; c < 3; c++)
+            check_near(points[c], exact[c], 1e-4 * exact[c] + 1e-6 * alb_profile_total(&profiles[c]));
+    }
+}
+
 // On a slab wide against the profile the middle row of S' sums to the profile's total, for any size of patches, and a
 // narrow profile does so on coarse patches too: the self-term is exact.
 static void wide_slab_gives_the_total(void **state)
@@ -203,9 +227,9 @@ static void columns_balance_rows(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(triangle_integral_is_exact), cmocka_unit_test(wide_slab_gives_the_total),
-        cmocka_unit_test(grading_does_not_matter),    cmocka_unit_test(faces_of_a_slab_are_told_apart),
-        cmocka_unit_test(columns_balance_rows),
+        cmocka_unit_test(triangle_integral_is_exact),     cmocka_unit_test(far_triangles_need_seven_points),
+        cmocka_unit_test(wide_slab_gives_the_total),      cmocka_unit_test(grading_does_not_matter),
+        cmocka_unit_test(faces_of_a_slab_are_told_apart), cmocka_unit_test(columns_balance_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
