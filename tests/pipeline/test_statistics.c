@@ -22,7 +22,7 @@ static const stated truth[ALB_SIDES][CHANNELS] = {
 static const char plan[] =
     "{\"format\": 1, \"sample\": {\"name\": \"stated\", \"thickness_mm\": 6, \"refractive_index\": 1.5},\n"
     " \"white_reference\": {\"reflectance\": [0.99, 0.98, 0.97]},\n"
-    " \"board\": {\"columns\": 7, \"rows\": 5, \"square_mm\": 5},\n"
+    " \"board\": {\"columns\": 7, \"rows\": 5, \"square_mm\": 3.5},\n"
     " \"shots\": [\n"
     "  {\"name\": \"dark\", \"target\": \"cap\", \"pattern\": {\"kind\": \"black\"}, \"exposures_s\": [0.02], "
     "\"repeats\": 4},\n"
