@@ -209,7 +209,7 @@ extern "C" bool alb_vision_chessboard(double *corners, bool *found, const alb_im
 
 extern "C" bool alb_vision_calibrate(alb_lens_estimate *estimate, alb_transform *poses, double *view_rms_px,
                                      const double *corners, const double *board, int views, int points, int width,
-                                     int height, alb_error *error)
+                                     int height, int terms, alb_error *error)
 {
     *estimate = alb_lens_estimate();
     return guarded("lens calibration", error, [&] {
@@ -219,8 +219,10 @@ extern "C" bool alb_vision_calibrate(alb_lens_estimate *estimate, alb_transform 
             seen.push_back(pixels(corners + 2 * v * points, points));
         cv::Mat k, d, sd_lens, sd_pose, errors;
         std::vector<cv::Mat> rotations, translations;
+        const int fixed = (terms < 1 ? cv::CALIB_FIX_K1 : 0) | (terms < 2 ? cv::CALIB_FIX_K2 : 0) |
+                          (terms < 4 ? cv::CALIB_ZERO_TANGENT_DIST : 0) | (terms < 5 ? cv::CALIB_FIX_K3 : 0);
         estimate->rms_px = cv::calibrateCamera(known, seen, cv::Size(width, height), k, d, rotations, translations,
-                                               sd_lens, sd_pose, errors);
+                                               sd_lens, sd_pose, errors, fixed);
         estimate->lens = {width,
                           height,
                           k.at<double>(0, 0),

@@ -22,9 +22,11 @@ typedef struct alb_lens_estimate {
 } alb_lens_estimate;
 
 // Intrinsics and poses from `views` photographs of one board: corners[view][point][2] pixels, board[point][2] mm (z =
-// 0). poses (views, camera_from_board) and view_rms_px (views) are filled. OpenCV's calibrateCamera, default flags.
+// 0). poses (views, camera_from_board) and view_rms_px (views) are filled. OpenCV's calibrateCamera with `terms`
+// coefficients of distortion free and the rest zero: 0 none, 1 k1, 2 k1 k2, 4 k1 k2 p1 p2, 5 all.
 bool alb_vision_calibrate(alb_lens_estimate *estimate, alb_transform *poses, double *view_rms_px, const double *corners,
-                          const double *board, int views, int points, int width, int height, alb_error *error);
+                          const double *board, int views, int points, int width, int height, int terms,
+                          alb_error *error);
 // camera_from_board from one photograph with known intrinsics (solvePnP, IPPE then Levenberg-Marquardt refinement).
 bool alb_vision_pose(alb_transform *pose, double *rms_px, const double *corners, const double *board, int points,
                      const alb_lens *lens, alb_error *error);

@@ -38,6 +38,7 @@ static void write_view(alb_json *json, const alb_view *view, const char *side)
     alb_json_end_list(json);
     alb_json_numbers(json, "translation_mm", &t->translation.x, 3);
     alb_json_number(json, "rms_px", view->rms_px);
+    alb_json_number(json, "relative_length_sd", view->relative_length_sd);
     alb_json_end_object(json);
 }
 
@@ -148,10 +149,11 @@ static bool read_views(alb_calibration *c, alb_node root, alb_error *error)
         if (!(view->known = alb_node_has(views, alb_side_names[s])))
             continue;
         if (!alb_node_object(&node, views, alb_side_names[s], error) ||
-            !alb_node_allow(node, "rotation translation_mm rms_px", error) ||
+            !alb_node_allow(node, "rotation translation_mm rms_px relative_length_sd", error) ||
             !alb_node_list(&rows, &count, node, "rotation", error) ||
             !alb_node_numbers(&t->translation.x, 3, node, "translation_mm", -1e9, 1e9, error) ||
-            !alb_node_number(&view->rms_px, node, "rms_px", 0, 1e9, error))
+            !alb_node_number(&view->rms_px, node, "rms_px", 0, 1e9, error) ||
+            !alb_node_number(&view->relative_length_sd, node, "relative_length_sd", 0, 1e3, error))
             return false;
         if (count != 3)
             return alb_node_fail(error, node, "rotation", "expected 3 rows, found %zu", count);

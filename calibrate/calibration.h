@@ -18,6 +18,7 @@ typedef struct alb_view {
     alb_camera camera; // world: the plane of the face, z = 0; origin the middle of the board's corners, x along its
                        // columns, y against its rows, z out of the face towards the camera; mm
     double rms_px;     // of the board photograph that gave the pose
+    double relative_length_sd; // of all lengths on the face together
 } alb_view;
 
 // Product of one shot.

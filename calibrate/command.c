@@ -106,12 +106,13 @@ static bool write_results(work *w, alb_error *error)
 static void print(const work *w)
 {
     const alb_calibration *c = &w->calibration;
-    printf("board in hand, rms by view\n");
+    printf("board, rms by view\n");
     alb_geometry_print(&w->boards);
     printf("lens      f %.2f +- %.2f px, rms %.3f px\n", c->views[0].camera.lens.fx, c->lens_sd[0], c->lens_rms_px);
     for (int s = 0; s < ALB_SIDES; s++)
         if (c->views[s].known)
-            printf("pose      %-12s rms %.3f px\n", alb_side_names[s], c->views[s].rms_px);
+            printf("pose      %-12s rms %.3f px, lengths known to %.3f %%\n", alb_side_names[s], c->views[s].rms_px,
+                   100 * c->views[s].relative_length_sd);
     for (int i = 0; i < c->channels; i++)
         printf("sensor    %s  black %.3f +- %.3f DN, read noise %.3f DN, gain %.5f +- %.5f DN per electron\n",
                c->channel_names[i], c->black_dn[i].value, c->black_dn[i].sd, c->read_noise_dn[i].value,

@@ -23,43 +23,48 @@ static bool look_at_shot(alb_board_views *views, const alb_session *session, con
     return true;
 }
 
-static bool measure_view(alb_view *view, const alb_session *session, const alb_shot *shot, const alb_board *board,
-                         alb_error *error)
+// All photographs of the board, those that lie on a face among them; flat[side] is the view of that face, or -1.
+static bool look_at_boards(alb_board_views *views, int flat[ALB_SIDES], const alb_session *session,
+                           const alb_board *board, alb_error *error)
 {
-    alb_board_views views = {0};
-    bool ok = look_at_shot(&views, session, shot, 1, board, error);
-    if (ok && views.found_count == 0)
-        ok = alb_fail(error, ALB_BAD_DATA, "%s: shot %s: no board of %d x %d inner corners is to be seen",
-                      session->folder, shot->name, board->columns, board->rows);
-    ok = ok && alb_board_pose(&view->camera.camera_from_world, &view->rms_px, &views, board, &view->camera.lens, error);
-    view->known = ok;
-    alb_board_views_free(&views);
-    return ok;
+    flat[ALB_REFLECTION] = flat[ALB_TRANSMISSION] = -1;
+    for (int s = 0; s < session->plan.shot_count; s++) {
+        const alb_shot *shot = &session->plan.shots[s];
+        if (shot->target != ALB_TARGET_BOARD)
+            continue;
+        if (!shot->in_hand)
+            flat[shot->side] = views->count;
+        if (!look_at_shot(views, session, shot, shot->in_hand ? shot->repeats : 1, board, error))
+            return false;
+        if (!shot->in_hand && !views->found[flat[shot->side]])
+            return alb_fail(error, ALB_BAD_DATA, "%s: shot %s: no board of %d x %d inner corners is to be seen",
+                            session->folder, shot->name, board->columns, board->rows);
+    }
+    return true;
 }
 
-bool alb_geometry_measure(alb_calibration *calibration, alb_board_views *in_hand, const alb_session *session,
+bool alb_geometry_measure(alb_calibration *calibration, alb_board_views *views, const alb_session *session,
                           alb_error *error)
 {
     const alb_plan *plan = &session->plan;
     const alb_board board = {plan->board_columns, plan->board_rows, plan->board_square_mm};
     alb_lens_estimate estimate;
-    for (int s = 0; s < plan->shot_count; s++) {
-        const alb_shot *shot = &plan->shots[s];
-        if (shot->target == ALB_TARGET_BOARD && shot->in_hand &&
-            !look_at_shot(in_hand, session, shot, shot->repeats, &board, error))
-            return false;
-    }
-    if (!alb_board_lens(&estimate, in_hand, &board, session->width, session->height, error))
+    int flat[ALB_SIDES], terms;
+    if (!look_at_boards(views, flat, session, &board, error) ||
+        !alb_board_lens(&estimate, &terms, views, &board, session->width, session->height, error))
         return false;
     calibration->lens_rms_px = estimate.rms_px;
     memcpy(calibration->lens_sd, estimate.sd, sizeof estimate.sd);
-    for (int s = 0; s < ALB_SIDES; s++)
-        calibration->views[s].camera.lens = estimate.lens;
-    for (int s = 0; s < plan->shot_count; s++) {
-        const alb_shot *shot = &plan->shots[s];
-        if (shot->target == ALB_TARGET_BOARD && !shot->in_hand &&
-            !measure_view(&calibration->views[shot->side], session, shot, &board, error))
+    for (int s = 0; s < ALB_SIDES; s++) {
+        alb_view *view = &calibration->views[s];
+        view->camera.lens = estimate.lens;
+        if (flat[s] < 0)
+            continue;
+        if (!alb_board_pose(&view->camera.camera_from_world, &view->rms_px, views, flat[s], &board, &estimate.lens,
+                            error) ||
+            !alb_board_length_sd(&view->relative_length_sd, views, flat[s], &board, &estimate.lens, terms, error))
             return false;
+        view->known = true;
     }
     return true;
 }
@@ -95,7 +100,7 @@ bool alb_geometry_photographs(alb_lens_estimate *estimate, alb_board_views *view
                               const alb_board *board, alb_error *error)
 {
     struct dirent **entries = NULL;
-    int size[2] = {0, 0};
+    int size[2] = {0, 0}, terms;
     if (!alb_file_is_directory(folder))
         return alb_fail(error, ALB_ACCESS, "%s: no such folder", folder);
     const int count = scandir(folder, &entries, is_picture, alphasort);
@@ -105,7 +110,7 @@ bool alb_geometry_photographs(alb_lens_estimate *estimate, alb_board_views *view
         free(entries[i]);
     }
     free(entries);
-    return ok && alb_board_lens(estimate, views, board, size[0], size[1], error);
+    return ok && alb_board_lens(estimate, &terms, views, board, size[0], size[1], error);
 }
 
 void alb_geometry_print(const alb_board_views *views)

@@ -3,8 +3,8 @@
 #include "calibrate/calibration.h"
 #include "calibrate/target.h"
 
-// Fills views, lens_sd and lens_rms_px; `in_hand` (freed by the caller) keeps what was found, view by view.
-bool alb_geometry_measure(alb_calibration *calibration, alb_board_views *in_hand, const alb_session *session,
+// Fills calibration->views, lens_sd and lens_rms_px; `views` (freed by the caller) keeps what was found, view by view.
+bool alb_geometry_measure(alb_calibration *calibration, alb_board_views *views, const alb_session *session,
                           alb_error *error);
 // The lens alone from all pictures of a folder, in the order of their names.
 bool alb_geometry_photographs(alb_lens_estimate *estimate, alb_board_views *views, const char *folder,

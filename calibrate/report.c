@@ -90,7 +90,8 @@ static void add_lens(alb_page *page, const alb_calibration *c, const alb_board_v
         alb_page_row(page, boards->found[v] ? "%s|%.3f" : "%s|not found", boards->name[v], boards->rms_px[v]);
     for (int s = 0; s < ALB_SIDES; s++)
         if (c->views[s].known)
-            alb_page_row(page, "pose, %s|%.3f", alb_side_names[s], c->views[s].rms_px);
+            alb_page_row(page, "pose, %s (lengths known to %.3f %%)|%.3f", alb_side_names[s],
+                         100 * c->views[s].relative_length_sd, c->views[s].rms_px);
     alb_page_end_table(page);
 }
 

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 void alb_board_views_free(alb_board_views *views)
 {
@@ -61,39 +62,67 @@ bool alb_board_look(alb_board_views *views, const alb_image *photograph, const c
     return true;
 }
 
-bool alb_board_lens(alb_lens_estimate *estimate, alb_board_views *views, const alb_board *board, int width, int height,
-                    alb_error *error)
+static bool solve(alb_lens_estimate *estimate, double *rms, const double *corners, int count, const alb_board *board,
+                  int width, int height, int terms, alb_error *error)
 {
-    double points[2 * ALB_BOARD_POINTS_MAX], rms[ALB_BOARD_VIEWS_MAX];
+    double points[2 * ALB_BOARD_POINTS_MAX];
     alb_transform poses[ALB_BOARD_VIEWS_MAX];
+    return board_points(points, board, error) &&
+           alb_vision_calibrate(estimate, poses, rms, corners, points, count, board->columns * board->rows, width,
+                                height, terms, error);
+}
+
+bool alb_board_lens(alb_lens_estimate *estimate, int *terms, alb_board_views *views, const alb_board *board, int width,
+                    int height, alb_error *error)
+{
+    static const int candidates[] = {0, 1, 2, 4, 5};
+    double best = INFINITY, rms[ALB_BOARD_VIEWS_MAX];
     if (views->found_count < 3)
         return alb_fail(error, ALB_BAD_DATA,
                         "the board of %d x %d inner corners was found in %d of %d photographs; at least 3 are needed",
                         board->columns, board->rows, views->found_count, views->count);
-    if (!board_points(points, board, error) ||
-        !alb_vision_calibrate(estimate, poses, rms, views->corners, points, views->found_count,
-                              board->columns * board->rows, width, height, error))
-        return false;
-    for (int v = 0, k = 0; v < views->count; v++)
-        views->rms_px[v] = views->found[v] ? rms[k++] : (double)NAN;
+    const double n = 2.0 * views->found_count * board->columns * board->rows;
+    for (int i = 0; i < 5; i++) {
+        alb_lens_estimate candidate;
+        if (!solve(&candidate, rms, views->corners, views->found_count, board, width, height, candidates[i], error))
+            return false;
+        const double bic = n * log(candidate.rms_px * candidate.rms_px) + candidates[i] * log(n);
+        if (!(bic < best))
+            continue;
+        best = bic;
+        *terms = candidates[i];
+        *estimate = candidate;
+        for (int v = 0, k = 0; v < views->count; v++)
+            views->rms_px[v] = views->found[v] ? rms[k++] : (double)NAN;
+    }
     const double focal = estimate->lens.fx / width;
-    if (!(focal > 0.1 && focal < 100) || !isfinite(estimate->rms_px) || estimate->rms_px > 0.02 * width)
+    if (!(focal > 0.1 && focal < 100) || !isfinite(best) || estimate->rms_px > 0.02 * width)
         return alb_fail(error, ALB_BAD_DATA,
                         "no lens explains the boards: focal length %.4g px, rms %.3g px; check the board's size",
                         estimate->lens.fx, estimate->rms_px);
     return true;
 }
 
-bool alb_board_pose(alb_transform *camera_from_world, double *rms_px, const alb_board_views *views,
+// Where a view's corners start; its place among the found ones.
+static const double *corners_of(const alb_board_views *views, int view, const alb_board *board, int *place)
+{
+    *place = 0;
+    for (int v = 0; v < view; v++)
+        *place += views->found[v];
+    return views->corners + (size_t)(2 * *place * board->columns * board->rows);
+}
+
+bool alb_board_pose(alb_transform *camera_from_world, double *rms_px, const alb_board_views *views, int view,
                     const alb_board *board, const alb_lens *lens, alb_error *error)
 {
     double points[2 * ALB_BOARD_POINTS_MAX];
-    if (views->found_count != 1)
-        return alb_fail(error, ALB_BAD_DATA, "the board that lies on the face was not found (%d x %d inner corners)",
+    int place;
+    if (!views->found[view])
+        return alb_fail(error, ALB_BAD_DATA, "%s: no board of %d x %d inner corners is to be seen", views->name[view],
                         board->columns, board->rows);
     alb_transform pose;
-    if (!board_points(points, board, error) ||
-        !alb_vision_pose(&pose, rms_px, views->corners, points, board->columns * board->rows, lens, error))
+    if (!board_points(points, board, error) || !alb_vision_pose(&pose, rms_px, corners_of(views, view, board, &place),
+                                                                points, board->columns * board->rows, lens, error))
         return false;
     const double x = pose.rotation[0][0] < 0 ? -1 : 1;
     const double signs[3] = {x, -x, -1};
@@ -102,4 +131,62 @@ bool alb_board_pose(alb_transform *camera_from_world, double *rms_px, const alb_
             pose.rotation[i][j] *= signs[j];
     *camera_from_world = pose;
     return true;
+}
+
+// The length that stands for the scale of a face: the root of the area that the middle half of the picture covers
+// there.
+static double length_on_face(const alb_camera *camera)
+{
+    double x[4], y[4], area = 0;
+    for (int i = 0; i < 4; i++)
+        if (!alb_camera_on_plane(&x[i], &y[i], NULL, camera, 0, camera->lens.width * (i == 1 || i == 2 ? 0.75 : 0.25),
+                                 camera->lens.height * (i < 2 ? 0.25 : 0.75)))
+            return NAN;
+    for (int i = 0; i < 4; i++)
+        area += (x[i] * y[(i + 1) % 4] - x[(i + 1) % 4] * y[i]) / 2;
+    return sqrt(fabs(area));
+}
+
+// sum |p - mean|^2 of the view's corners: a scale of the picture by 1 + e moves them by e times that much.
+static double spread_px2(const double *corners, int points)
+{
+    double u = 0, v = 0, sum = 0;
+    for (int i = 0; i < points; i++)
+        u += corners[2 * i] / points, v += corners[2 * i + 1] / points;
+    for (int i = 0; i < points; i++)
+        sum += (corners[2 * i] - u) * (corners[2 * i] - u) + (corners[2 * i + 1] - v) * (corners[2 * i + 1] - v);
+    return sum;
+}
+
+bool alb_board_length_sd(double *relative_sd, const alb_board_views *views, int view, const alb_board *board,
+                         const alb_lens *lens, int terms, alb_error *error)
+{
+    const int points = board->columns * board->rows, count = views->found_count;
+    int place;
+    const double *own = corners_of(views, view, board, &place);
+    double lengths[ALB_BOARD_VIEWS_MAX], mean = 0, squares = 0, rms = 0, view_rms[ALB_BOARD_VIEWS_MAX];
+    const size_t row = (size_t)points * 2;
+    double *kept = alb_allocate((size_t)count * row, sizeof *kept, error);
+    bool ok = kept != NULL;
+    for (int out = 0; ok && out < count; out++) {
+        alb_lens_estimate estimate;
+        alb_camera camera;
+        memcpy(kept, views->corners, (size_t)out * row * sizeof *kept);
+        memcpy(kept + (size_t)out * row, views->corners + (size_t)(out + 1) * row,
+               (size_t)(count - 1 - out) * row * sizeof *kept);
+        ok = solve(&estimate, view_rms, kept, count - 1, board, lens->width, lens->height, terms, error);
+        camera.lens = estimate.lens;
+        ok = ok && alb_board_pose(&camera.camera_from_world, &rms, views, view, board, &camera.lens, error);
+        lengths[out] = ok ? length_on_face(&camera) : (double)NAN;
+        mean += lengths[out] / count;
+    }
+    for (int out = 0; out < count; out++)
+        squares += (lengths[out] / mean - 1) * (lengths[out] / mean - 1);
+    alb_transform pose;
+    ok = ok && alb_board_pose(&pose, &rms, views, view, board, lens, error);
+    const double corner_variance =
+        0.5 * rms * rms * points / (points - 3.0); // an axis; six parameters for 2 points data
+    *relative_sd = sqrt(squares * (count - 1) / count + corner_variance / spread_px2(own, points));
+    free(kept);
+    return ok;
 }

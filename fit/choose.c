@@ -14,7 +14,8 @@
 //    between. Without that, two exponentials lose 8 % of the energy of a real reflection. Half of the share beyond the
 //    readings is added to the sd of the total. The form of least
 //    sum ln(sd_i^2 + t^2 f_i^2) + k ln n is taken, among those whose parameters the data decide where there is one.
-// 4. The sd of the common scale enters last: covariance += a a^T s^2 over the amplitudes, total likewise.
+// 4. The sd of what all readings share enters last: of the flux, over amplitudes and total; of the unit of length, over
+//    amplitudes (twice) and decays.
 //
 // The data do not decide where J^T J is singular, a parameter is uncertain by more than half of itself, a decay is
 // slower than a tenth of the range shows, or more than half of the total lies where nothing was measured.
@@ -269,8 +270,20 @@ static void judge(alb_outcome *outcome, const alb_readings *readings, bool full_
     outcome->fitted.identifiable = !*why;
 }
 
+// What all readings share: amplitudes are flux / length^2, decays 1 / length.
+static void add_common(alb_fitted *fitted, int n, alb_common_sd common)
+{
+    const double *values = fitted->profile.parameters;
+    for (int p = 0; p < n; p++)
+        for (int q = 0; q < n; q++) {
+            const double flux = p % 2 || q % 2 ? 0 : common.flux * common.flux;
+            const double length = (p % 2 ? 1 : 2) * (q % 2 ? 1 : 2) * common.length * common.length;
+            fitted->covariance[p][q] += values[p] * values[q] * (flux + length);
+        }
+}
+
 static bool complete(alb_outcome *outcome, alb_candidate candidate, const alb_readings *readings,
-                     const alb_weighing *weighing, double energy_sd, double relative_scale_sd, alb_error *error)
+                     const alb_weighing *weighing, double energy_sd, alb_common_sd common, alb_error *error)
 {
     alb_fitted *fitted = &outcome->fitted;
     const alb_profile *profile = &fitted->profile;
@@ -286,11 +299,8 @@ static bool complete(alb_outcome *outcome, alb_candidate candidate, const alb_re
     if (outcome->discrepancy_relative > 0)
         variance = fmax(variance, energy_sd * energy_sd) + 0.25 * (beyond * beyond + core * core);
     outcome->measured_share = 1 - (beyond + core) / fitted->total;
-    for (int p = 0; p < n; p += 2)
-        for (int q = 0; q < n; q += 2)
-            fitted->covariance[p][q] +=
-                profile->parameters[p] * profile->parameters[q] * relative_scale_sd * relative_scale_sd;
-    fitted->total_sd = sqrt(variance + fitted->total * fitted->total * relative_scale_sd * relative_scale_sd);
+    add_common(fitted, n, common);
+    fitted->total_sd = sqrt(variance + fitted->total * fitted->total * common.flux * common.flux);
     for (int p = 0; p < n; p++)
         fitted->sd[p] = sqrt(fitted->covariance[p][p]);
     double *model = alb_operator_readings(weighing->forward, profile, error);
@@ -314,8 +324,8 @@ static bool complete(alb_outcome *outcome, alb_candidate candidate, const alb_re
     return true;
 }
 
-bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward,
-                double relative_scale_sd, alb_error *error)
+bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward, alb_common_sd common,
+                alb_error *error)
 {
     bool ok = false, stands;
     int chosen;
@@ -345,7 +355,7 @@ bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_op
     }
     outcome->fitted.profile = fits[chosen].profile;
     outcome->tied = candidates[chosen].tied;
-    ok = complete(outcome, candidates[chosen], readings, &weighing, energy_sd, relative_scale_sd, error);
+    ok = complete(outcome, candidates[chosen], readings, &weighing, energy_sd, common, error);
 done:
     alb_basis_free(&basis);
     free(sd);

@@ -24,7 +24,13 @@ typedef struct alb_outcome {
     char undecided[ALB_REASON_SIZE]; // why the data do not decide; empty where they do (fitted.identifiable)
 } alb_outcome;
 
-// relative_scale_sd is that of a factor common to all readings. ALB_UNDECIDED where there are fewer than 3 readings;
+// Relative standard deviations of what all readings share: the incident flux, a factor of all values; and the unit of
+// length, which scales decays by 1 / (1 + e), amplitudes by 1 / (1 + e)^2 and leaves the total as it is.
+typedef struct alb_common_sd {
+    double flux, length;
+} alb_common_sd;
+
+// ALB_UNDECIDED where there are fewer than 3 readings;
 // where the data do not decide between parameters it succeeds, with the best guess and the reason.
-bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward,
-                double relative_scale_sd, alb_error *error);
+bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward, alb_common_sd common,
+                alb_error *error);

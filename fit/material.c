@@ -6,12 +6,12 @@
 #include <stdio.h>
 #include <string.h>
 
-bool alb_fitting_run(alb_fitting *fitting, alb_side side, int channel, double relative_scale_sd, alb_error *error)
+bool alb_fitting_run(alb_fitting *fitting, alb_side side, int channel, alb_common_sd common, alb_error *error)
 {
     alb_measurement *measurement = &fitting->sides[side][channel];
     alb_error reason = {0};
     measurement->measured =
-        alb_choose(&measurement->outcome, &measurement->readings, &measurement->forward, relative_scale_sd, &reason);
+        alb_choose(&measurement->outcome, &measurement->readings, &measurement->forward, common, &reason);
     if (!measurement->measured)
         return alb_fail(error, reason.status, "%s %s: %s", alb_side_names[side],
                         fitting->material.channel_names[channel], reason.text);

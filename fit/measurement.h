@@ -17,7 +17,7 @@ typedef struct alb_fitting {
 } alb_fitting;
 
 // Fits one side and channel whose readings and forward model are there.
-bool alb_fitting_run(alb_fitting *fitting, alb_side side, int channel, double relative_scale_sd, alb_error *error);
+bool alb_fitting_run(alb_fitting *fitting, alb_side side, int channel, alb_common_sd common, alb_error *error);
 void alb_fitting_free(alb_fitting *fitting);
 
 // Puts the content of material.json into an open object.

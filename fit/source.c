@@ -54,7 +54,7 @@ static bool plane_take(plane *out, const alb_image *image, const char *channel, 
 // Observes one channel of an image, builds the forward model and fits. Errors call the image `from`; notes, which end
 // up in derived files, do not.
 static bool fit_plane(alb_fitting *fitting, const char *from, alb_side side, int channel, const alb_face *face,
-                      const plane *pixels, const alb_spot *spot, double relative_scale_sd, alb_text *notes,
+                      const plane *pixels, const alb_spot *spot, alb_common_sd common, alb_text *notes,
                       alb_error *error)
 {
     char name[64], full_name[1024];
@@ -73,7 +73,7 @@ static bool fit_plane(alb_fitting *fitting, const char *from, alb_side side, int
     if (readings->outer_mm > readings->complete_mm)
         alb_text_add(notes, "%s: rings beyond %.4g mm are cut by the border of the image.\n", name,
                      readings->complete_mm);
-    return alb_fitting_run(fitting, side, channel, relative_scale_sd, error);
+    return alb_fitting_run(fitting, side, channel, common, error);
 }
 
 static bool read_product(alb_image *image, alb_provenance *provenance, const alb_calibration *calibration,
@@ -152,9 +152,10 @@ static bool fit_product(alb_fitting *fitting, alb_provenance *provenance, alb_te
               measure_spots(spots, provenance, calibration, &product->pattern, error);
     for (int c = 0; ok && c < calibration->channels; c++) {
         plane pixels = {0};
+        const alb_common_sd common = {product->relative_scale_sd[c],
+                                      calibration->views[product->side].relative_length_sd};
         ok = plane_take(&pixels, &image, calibration->channel_names[c], M_PI, INFINITY, error) &&
-             fit_plane(fitting, product->shot, product->side, c, &face, &pixels, &spots[c],
-                       product->relative_scale_sd[c], notes, error);
+             fit_plane(fitting, product->shot, product->side, c, &face, &pixels, &spots[c], common, notes, error);
         plane_free(&pixels);
     }
     for (int c = 0; c < 3; c++)
@@ -238,7 +239,7 @@ static bool fit_image(alb_fitting *fitting, alb_text *notes, const char *path, a
     for (int c = 0; ok && c < fitting->material.channels; c++) {
         plane pixels = {0};
         ok = plane_take(&pixels, &image, fitting->material.channel_names[c], 1, saturation, error) &&
-             fit_plane(fitting, path, side, c, &face, &pixels, spot, 0, notes, error);
+             fit_plane(fitting, path, side, c, &face, &pixels, spot, (alb_common_sd){0, 0}, notes, error);
         plane_free(&pixels);
     }
     alb_face_free(&face);
@@ -277,5 +278,5 @@ bool alb_fitting_from_table(alb_fitting *fitting, alb_provenance *provenance, co
     snprintf(fitting->material.channel_names[0], sizeof fitting->material.channel_names[0], "Y");
     return alb_table_read(&measurement->readings, path, error) && alb_provenance_add(provenance, path, error) &&
            alb_operator_identity(&measurement->forward, &measurement->readings, error) &&
-           alb_fitting_run(fitting, side, 0, 0, error);
+           alb_fitting_run(fitting, side, 0, (alb_common_sd){0, 0}, error);
 }

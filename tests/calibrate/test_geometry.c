@@ -76,7 +76,8 @@ static void drawn_boards(void **state)
         alb_image_free(&image);
     }
     alb_lens_estimate estimate;
-    check_ok(alb_board_lens(&estimate, &views, &board, 480, 360, &error), &error);
+    int terms;
+    check_ok(alb_board_lens(&estimate, &terms, &views, &board, 480, 360, &error), &error);
     print_message("drawn boards: found %d, rms %.4f px, f %.3f +- %.3f (700)\n", views.found_count, estimate.rms_px,
                   estimate.lens.fx, estimate.sd[0]);
     check_near(estimate.lens.fx, truth.fx, 5 * estimate.sd[0] + 0.05);
@@ -92,7 +93,7 @@ static void drawn_boards(void **state)
     check_ok(alb_board_look(&views, &image, "flat", &board, &error), &error);
     alb_camera found = {.lens = truth};
     double rms;
-    check_ok(alb_board_pose(&found.camera_from_world, &rms, &views, &board, &truth, &error), &error);
+    check_ok(alb_board_pose(&found.camera_from_world, &rms, &views, 0, &board, &truth, &error), &error);
     for (int k = 0; k < 9; k++) { // positions in the face's plane, z towards the camera
         double x0, y0, x1, y1;
         const double u = 60 + 180 * (k % 3), v = 40 + 140 * (k / 3);
@@ -122,7 +123,9 @@ static void no_board(void **state)
     check_ok(alb_board_look(&views, &image, "noise", &board, &error), &error);
     assert_int_equal(views.found_count, 0);
     alb_lens_estimate estimate;
-    check_fails(alb_board_lens(&estimate, &views, &board, 200, 150, &error), &error, ALB_BAD_DATA, "found in 0 of 2");
+    int terms;
+    check_fails(alb_board_lens(&estimate, &terms, &views, &board, 200, 150, &error), &error, ALB_BAD_DATA,
+                "found in 0 of 2");
     alb_image_free(&image);
     alb_board_views_free(&views);
 }

@@ -25,7 +25,7 @@ static void choose(alb_outcome *outcome, const alb_readings *readings, double sc
     alb_error error = {0};
     alb_operator forward = {0};
     check_ok(alb_operator_identity(&forward, readings, &error), &error);
-    check_ok(alb_choose(outcome, readings, &forward, scale_sd, &error), &error);
+    check_ok(alb_choose(outcome, readings, &forward, (alb_common_sd){scale_sd, 0}, &error), &error);
     alb_operator_free(&forward);
 }
 
@@ -169,7 +169,7 @@ static void undecided(void **state)
 
     make(&readings, &plain, 3, 0.01, 2, &random);
     check_ok(alb_operator_identity(&forward, &readings, &error), &error);
-    check_fails(alb_choose(&outcome, &readings, &forward, 0, &error), &error, ALB_UNDECIDED, "2 readings");
+    check_fails(alb_choose(&outcome, &readings, &forward, (alb_common_sd){0, 0}, &error), &error, ALB_UNDECIDED, "2 readings");
     alb_operator_free(&forward);
     alb_readings_free(&readings);
 
@@ -179,7 +179,7 @@ static void undecided(void **state)
         for (int i = 0; i < READINGS; i++)
             readings.value[i] = kind ? -1 : 1e-3 * i * i;
         check_ok(alb_operator_identity(&forward, &readings, &error), &error);
-        if (alb_choose(&outcome, &readings, &forward, 0, &error))
+        if (alb_choose(&outcome, &readings, &forward, (alb_common_sd){0, 0}, &error))
             assert_false(outcome.fitted.identifiable);
         else
             assert_int_equal(error.status, ALB_UNDECIDED);
@@ -226,7 +226,7 @@ static void pictures_to_totals(void **state)
         alb_outcome outcome;
         check_ok(alb_observe(&readings, &channel, &error), &error);
         check_ok(alb_operator_create(&forward, &readings, &spot, &error), &error);
-        check_ok(alb_choose(&outcome, &readings, &forward, 0, &error), &error);
+        check_ok(alb_choose(&outcome, &readings, &forward, (alb_common_sd){0, 0}, &error), &error);
         assert_int_equal(outcome.fitted.profile.form, ALB_FORM_TWO_EXPONENTIALS);
         assert_true(outcome.fitted.identifiable);
         // the disc of the lattice is only 1/24 fine: its radius is known to about 0.3 %, hence the total

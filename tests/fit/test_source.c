@@ -100,7 +100,7 @@ static void make_session(void)
     const alb_vector up = {0, 1, 0}, target = {0, 0, 0};
     for (int side = 0; side < ALB_SIDES; side++) {
         const alb_vector eye = {side ? 0 : 40, 10, 90};
-        c->views[side] = (alb_view){true, alb_camera_look_at(eye, target, up, 7, WIDTH, HEIGHT), 0.1};
+        c->views[side] = (alb_view){true, alb_camera_look_at(eye, target, up, 7, WIDTH, HEIGHT), 0.1, 0};
     }
     const alb_pattern pattern = {.kind = ALB_PATTERN_SPOT, .diameter_px = 10};
     c->products[0] = (alb_product){"white_spot", ALB_REFLECTION, ALB_TARGET_WHITE, pattern, {0}};

@@ -144,7 +144,7 @@ static void milk(void **state)
     check_ok(alb_table_parse(&readings, "milk.csv", text, &error), &error);
     assert_in_range(readings.count, 353, 354);
     check_ok(alb_operator_identity(&forward, &readings, &error), &error);
-    check_ok(alb_choose(&outcome, &readings, &forward, 0, &error), &error);
+    check_ok(alb_choose(&outcome, &readings, &forward, (alb_common_sd){0, 0}, &error), &error);
     double *fitted = alb_operator_readings(&forward, &outcome.fitted.profile, &error);
     assert_non_null(fitted);
     const double measured = log_slope(readings.r_mm, readings.value, readings.count, 15, 30);

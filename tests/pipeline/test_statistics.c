@@ -113,8 +113,9 @@ static void error_bars_are_honest(void **state)
     int wrong_form = 0;
     FILE *narration = stdout;
     fflush(stdout);
-    const int kept = dup(STDOUT_FILENO);
+    const int kept = dup(STDOUT_FILENO), kept_narration = dup(STDERR_FILENO);
     (void)!freopen("statistics.log", "w", stdout);
+    dup2(STDOUT_FILENO, STDERR_FILENO);
     for (int k = 0; k < SESSIONS; k++) {
         alb_material material;
         one_session(&material, k + 1);
@@ -132,7 +133,9 @@ static void error_bars_are_honest(void **state)
     }
     fflush(narration);
     dup2(kept, STDOUT_FILENO);
+    dup2(kept_narration, STDERR_FILENO);
     close(kept);
+    close(kept_narration);
     print_message("%d sessions, %d channels; mean and variance of (recovered - true) / sd\n", SESSIONS, CHANNELS);
     double worst_mean = 0, worst_variance = 0;
     for (int side = 0; side < ALB_SIDES; side++)
