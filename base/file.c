@@ -58,7 +58,12 @@ bool alb_file_read(char **bytes, size_t *size, const char *path, alb_error *erro
     if (!file)
         return alb_fail(error, ALB_ACCESS, "%s: cannot be opened: %s", path, strerror(errno));
     struct stat status;
-    capacity = !fstat(fileno(file), &status) && status.st_size > 0 ? (size_t)status.st_size : 0;
+    const bool known = !fstat(fileno(file), &status);
+    if (known && (S_ISCHR(status.st_mode) || S_ISBLK(status.st_mode))) { // may never end
+        alb_fail(error, ALB_ACCESS, "%s: is a device, not a file", path);
+        goto done;
+    }
+    capacity = known && status.st_size > 0 ? (size_t)status.st_size : 0;
     if (capacity > limit) {
         alb_fail(error, ALB_BAD_DATA, "%s: %zu bytes is more than the 2 GiB that are read", path, capacity);
         goto done;
@@ -74,10 +79,11 @@ bool alb_file_read(char **bytes, size_t *size, const char *path, alb_error *erro
         length += fread(content + length, 1, capacity - length, file);
         if (length < capacity)
             break;
-        if ((capacity *= 2) > 2 * limit) {
+        if (capacity > limit) {
             alb_fail(error, ALB_BAD_DATA, "%s: more than the 2 GiB that are read", path);
             goto done;
         }
+        capacity = 2 * capacity < limit ? 2 * capacity : limit + 1;
     }
     if (ferror(file)) {
         alb_fail(error, ALB_ACCESS, "%s: cannot be read: %s", path, strerror(errno));
@@ -93,8 +99,26 @@ done:
     return ok;
 }
 
+bool alb_file_check_target(const char *path, alb_error *error)
+{
+    struct stat status;
+    char folder[ALB_PATH_SIZE];
+    if (!alb_path_folder(folder, path, error))
+        return false;
+    if (!*path || path[strlen(path) - 1] == '/')
+        return alb_fail(error, ALB_ACCESS, "%s: cannot be written: a file's name is wanted, not a folder's", path);
+    if (access(folder, W_OK | X_OK))
+        return alb_fail(error, ALB_ACCESS, "%s: cannot be written: folder %s: %s", path, folder, strerror(errno));
+    if (!stat(path, &status) && !S_ISREG(status.st_mode))
+        return alb_fail(error, ALB_ACCESS, "%s: cannot be written: %s stands there", path,
+                        S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe");
+    return true;
+}
+
 bool alb_file_begin(char temporary[ALB_PATH_SIZE], const char *path, alb_error *error)
 {
+    if (!alb_file_check_target(path, error))
+        return false;
     const int length = snprintf(temporary, ALB_PATH_SIZE, "%s.%ld.tmp", path, (long)getpid());
     if (length < 0 || length >= ALB_PATH_SIZE)
         return alb_fail(error, ALB_USAGE, "path is longer than %d bytes: %.60s...", ALB_PATH_SIZE - 32, path);
@@ -172,9 +196,10 @@ bool alb_path_join(char out[ALB_PATH_SIZE], const char *a, const char *b, alb_er
     const size_t size = strlen(a);
     const char *between = !alone && a[size - 1] != '/' ? "/" : "";
     const int length = snprintf(out, ALB_PATH_SIZE, "%s%s%s", alone ? "" : a, alone ? "" : between, b);
-    if (length < 0 || length >= ALB_PATH_SIZE)
-        return alb_fail(error, ALB_USAGE, "path is longer than %d bytes: %.60s...", ALB_PATH_SIZE, b);
-    return true;
+    if (length >= 0 && length < ALB_PATH_SIZE)
+        return true;
+    out[0] = '\0'; // half a path leads elsewhere
+    return alb_fail(error, ALB_USAGE, "path is longer than %d bytes: %.60s...", ALB_PATH_SIZE, b);
 }
 
 bool alb_path_folder(char out[ALB_PATH_SIZE], const char *path, alb_error *error)

@@ -7,13 +7,18 @@
 static void string(alb_text *text, const char *value)
 {
     alb_text_add(text, "\"");
-    for (const unsigned char *c = (const unsigned char *)value; *c; c++) {
-        if (*c == '"' || *c == '\\')
-            alb_text_add(text, "\\%c", *c);
-        else if (*c < 0x20)
-            alb_text_add(text, "\\u%04x", *c);
-        else
-            alb_text_add_bytes(text, c, 1);
+    for (const char *c = value; *c;) {
+        const unsigned char byte = (unsigned char)*c;
+        const int size = alb_text_sequence(c);
+        if (byte == '"' || byte == '\\')
+            alb_text_add(text, "\\%c", byte);
+        else if (byte < 0x20)
+            alb_text_add(text, "\\u%04x", byte);
+        else if (size)
+            alb_text_add_bytes(text, c, (size_t)size);
+        else // file names may hold anything; JSON holds UTF-8 alone
+            alb_text_add(text, "\xef\xbf\xbd");
+        c += size ? size : 1;
     }
     alb_text_add(text, "\"");
 }

@@ -21,11 +21,12 @@ void alb_board_views_free(alb_board_views *views)
 
 static bool board_points(double *points, const alb_board *board, alb_error *error)
 {
-    const int count = board->columns * board->rows;
     if (board->columns < 3 || board->rows < 3 || board->columns > 64 || board->rows > 64 ||
-        count > ALB_BOARD_POINTS_MAX)
-        return alb_fail(error, ALB_BAD_DATA, "a board of %d x %d inner corners; 3 x 3 to 32 x 32 are supported",
-                        board->columns, board->rows);
+        board->columns * board->rows > ALB_BOARD_POINTS_MAX)
+        return alb_fail(error, ALB_BAD_DATA,
+                        "a board of %d x %d inner corners; 3 to 64 each way and at most %d together are supported",
+                        board->columns, board->rows, ALB_BOARD_POINTS_MAX);
+    const int count = board->columns * board->rows;
     for (int i = 0; i < count; i++) {
         points[2 * i] = (i % board->columns - 0.5 * (board->columns - 1)) * board->square_mm;
         points[2 * i + 1] = (i / board->columns - 0.5 * (board->rows - 1)) * board->square_mm;
@@ -37,9 +38,9 @@ bool alb_board_look(alb_board_views *views, const alb_image *photograph, const c
                     alb_error *error)
 {
     double points[2 * ALB_BOARD_POINTS_MAX];
-    const int count = board->columns * board->rows;
     if (!board_points(points, board, error))
         return false;
+    const int count = board->columns * board->rows;
     if (views->count == ALB_BOARD_VIEWS_MAX)
         return alb_fail(error, ALB_BAD_DATA, "more than %d photographs of the board", ALB_BOARD_VIEWS_MAX);
     if (!views->corners) {

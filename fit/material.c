@@ -200,7 +200,7 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
         return false;
     fitted->degrees_of_freedom = (int)freedom;
     const double expected = alb_profile_total(&fitted->profile);
-    if (fabs(fitted->total - expected) > 1e-6 * expected)
+    if (!isfinite(expected) || fabs(fitted->total - expected) > 1e-6 * expected)
         return alb_node_fail(error, node, "total", "%g does not belong to the parameters, whose total is %g",
                              fitted->total, expected);
     return true;
