@@ -120,12 +120,18 @@ void alb_json_estimate(alb_json *json, const char *key, double value, double sd)
 bool alb_provenance_add(alb_provenance *provenance, const char *path, alb_error *error)
 {
     const int count = provenance->input_count, most = (int)(sizeof provenance->inputs / sizeof provenance->inputs[0]);
-    if (count == most)
-        return alb_fail(error, ALB_INTERNAL, "%s: more than %d inputs in one provenance", path, most);
     const char *name = alb_path_name(path);
-    snprintf(provenance->inputs[count].name, sizeof provenance->inputs[count].name, "%.255s", name);
-    if (!alb_hash_file(provenance->inputs[count].sha256, path, error))
+    char sha256[ALB_HASH_SIZE];
+    if (!alb_hash_file(sha256, path, error))
         return false;
+    for (int i = 0; i < count; i++)
+        if (!strcmp(provenance->inputs[i].sha256, sha256) && !strcmp(provenance->inputs[i].name, name))
+            return true;
+    if (count == most)
+        return alb_fail(error, ALB_BAD_DATA, "%s: more than the %d different input files that a result can name", path,
+                        most);
+    snprintf(provenance->inputs[count].name, sizeof provenance->inputs[count].name, "%.255s", name);
+    memcpy(provenance->inputs[count].sha256, sha256, sizeof sha256);
     provenance->input_count++;
     return true;
 }

@@ -2,8 +2,10 @@
 // signal:
 //   E[y] = b + s,   Var[y] = K s + sigma_r^2        (sigma_r: read noise with quantisation, in DN)
 // From two frames of one scene, d = y1 - y2 has mean zero and E[d^2] / 2 = K s + sigma_r^2 in every pixel, so that
-// averages over pixels give K = (mean(d^2) / 2 - sigma_r^2) / mean(s) whether the field is even or not. Stops being
-// true where the light flickers between the two frames, and near full well.
+// averages over pixels give K = (mean(d^2) / 2 - sigma_r^2) / mean(s) whether the field is even or not. Dark frames of
+// a sensor quieter than its converter's step repeat themselves; their rounding error is still 1/12 DN^2, which is the
+// least sigma_r^2 of whole numbers. Stops being true where the light flickers between the two frames, and near full
+// well.
 #include "calibrate/noise.h"
 #include "base/memory.h"
 #include "calibrate/frames.h"
@@ -16,6 +18,7 @@ typedef struct pair {
     double maximum;
     double exposure_s;
     bool first; // of its exposure
+    bool whole; // all values are whole numbers
 } pair;
 
 typedef struct pairs {
@@ -28,7 +31,7 @@ static bool pair_read(pair *p, const alb_session *session, const alb_shot *shot,
                       alb_error *error)
 {
     alb_image a = {0}, b = {0};
-    *p = (pair){.exposure_s = shot->obtained_s[exposure], .first = repeat == 0};
+    *p = (pair){.exposure_s = shot->obtained_s[exposure], .first = repeat == 0, .whole = true};
     const bool ok = alb_frame_read(&a, session, shot, exposure, repeat, error) &&
                     alb_frame_read(&b, session, shot, exposure, repeat + 1, error);
     const size_t count = (size_t)session->width * (size_t)session->height, channels = (size_t)session->channels;
@@ -38,6 +41,7 @@ static bool pair_read(pair *p, const alb_session *session, const alb_shot *shot,
             p->mean[c] += (y1 + y2) / 2 / (double)count;
             p->variance[c] += (y1 - y2) * (y1 - y2) / 2 / (double)count;
             p->maximum = fmax(p->maximum, fmax(y1, y2));
+            p->whole &= y1 == rint(y1) && y2 == rint(y2);
         }
     alb_image_free(&a);
     alb_image_free(&b);
@@ -70,13 +74,20 @@ static bool measure_dark(alb_noise *noise, const alb_session *session, const pai
                         session->folder);
     for (int c = 0; c < session->channels; c++) {
         double mean = 0, variance = 0;
+        bool whole = true;
         for (int k = 0; k < dark->count; k++) {
+            whole &= dark->items[k].whole;
             if (dark->items[k].maximum >= session->white_level_dn)
                 return alb_fail(error, ALB_BAD_DATA, "%s: dark frames of %g s reach the white level", session->folder,
                                 dark->items[k].exposure_s);
             mean += dark->items[k].mean[c] / dark->count;
             variance += dark->items[k].variance[c] / dark->count;
         }
+        variance = fmax(variance, whole ? 1.0 / 12 : 0);
+        if (!(variance > 0))
+            return alb_fail(error, ALB_BAD_DATA,
+                            "%s: the dark frames are copies of each other in channel %s: no noise to measure",
+                            session->folder, session->channel_names[c]);
         const double frames = 2 * dark->count * dark->pixels;
         noise->black_dn[c] = (alb_estimate){mean, sqrt(variance / frames)};
         noise->read_noise_dn[c] = (alb_estimate){sqrt(variance), sqrt(variance / frames)};

@@ -180,10 +180,11 @@ static bool store_session(frame_level *levels, const alb_rig *rig, void *state, 
 {
     alb_store store = {0};
     const struct sigaction action = {.sa_handler = interrupt};
-    struct sigaction before[2];
+    struct sigaction before[3];
     interrupted = 0;
     sigaction(SIGINT, &action, &before[0]);
     sigaction(SIGTERM, &action, &before[1]);
+    sigaction(SIGHUP, &action, &before[2]);
     bool ok = alb_store_open(&store, folder, error);
     if (ok)
         strcpy(session->folder, store.partial);
@@ -193,6 +194,7 @@ static bool store_session(frame_level *levels, const alb_rig *rig, void *state, 
     alb_store_close(&store);
     sigaction(SIGINT, &before[0], NULL);
     sigaction(SIGTERM, &before[1], NULL);
+    sigaction(SIGHUP, &before[2], NULL);
     return ok;
 }
 

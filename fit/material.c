@@ -170,9 +170,8 @@ static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
     if (row_count != (size_t)n)
         return alb_node_fail(error, node, "covariance", "%zu rows for %d parameters", row_count, n);
     for (size_t p = 0; p < row_count; p++)
-        for (size_t q = 0; q < row_count; q++)
-            if (!alb_node_item_number(&fitted->covariance[p][q], alb_node_item(rows, p), q, -1e300, 1e300, error))
-                return false;
+        if (!alb_node_item_numbers(fitted->covariance[p], row_count, rows, p, -1e300, 1e300, error))
+            return false;
     return true;
 }
 
