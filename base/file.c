@@ -12,32 +12,54 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// What a signal handler removes. The one piece of global state: a handler can be told nothing else.
-static char pending[ALB_PATH_SIZE];
-static volatile sig_atomic_t pending_set;
+// What a signal handler removes. The one piece of global state: a handler can be told nothing else. Several threads may
+// each have a file under way; one beyond the table is written all the same, but an interrupt would leave it.
+enum { PENDING_MAX = 16 };
+static char pending[PENDING_MAX][ALB_PATH_SIZE];
+static volatile sig_atomic_t pending_set[PENDING_MAX];
 
 static void remove_pending(int signal_number)
 {
-    if (pending_set)
-        unlink(pending);
+    for (int i = 0; i < PENDING_MAX; i++)
+        if (pending_set[i])
+            unlink(pending[i]);
     signal(signal_number, SIG_DFL);
     raise(signal_number);
 }
 
-static void guard(const char *temporary)
+static void install_handler(void)
 {
     static bool installed;
-    if (!installed) {
-        installed = true;
-        const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
-        for (int i = 0; i < 3; i++) {
-            struct sigaction old;
-            if (!sigaction(numbers[i], NULL, &old) && old.sa_handler == SIG_DFL)
-                signal(numbers[i], remove_pending);
+    const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
+    for (int i = 0; !installed && i < 3; i++) {
+        struct sigaction old;
+        if (!sigaction(numbers[i], NULL, &old) && old.sa_handler == SIG_DFL)
+            signal(numbers[i], remove_pending);
+    }
+    installed = true;
+}
+
+static void guard(const char *temporary)
+{
+#pragma omp critical(alb_file_pending)
+    {
+        int slot = 0;
+        install_handler();
+        while (slot < PENDING_MAX && pending_set[slot])
+            slot++;
+        if (slot < PENDING_MAX) {
+            snprintf(pending[slot], ALB_PATH_SIZE, "%s", temporary);
+            pending_set[slot] = 1;
         }
     }
-    snprintf(pending, sizeof pending, "%s", temporary);
-    pending_set = 1;
+}
+
+static void unguard(const char *temporary)
+{
+#pragma omp critical(alb_file_pending)
+    for (int i = 0; i < PENDING_MAX; i++)
+        if (pending_set[i] && !strcmp(pending[i], temporary))
+            pending_set[i] = 0;
 }
 
 bool alb_file_exists(const char *path) { return access(path, F_OK) == 0; }
@@ -133,14 +155,14 @@ bool alb_file_commit(const char *temporary, const char *path, alb_error *error)
         alb_file_abandon(temporary);
         return alb_fail(error, ALB_ACCESS, "%s: cannot be written: %s", path, strerror(reason));
     }
-    pending_set = 0;
+    unguard(temporary);
     return true;
 }
 
 void alb_file_abandon(const char *temporary)
 {
     unlink(temporary);
-    pending_set = 0;
+    unguard(temporary);
 }
 
 bool alb_file_write(const char *path, const void *bytes, size_t size, alb_error *error)
