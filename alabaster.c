@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 static const alb_command *const commands[] = {
     &alb_capture_command, &alb_calibrate_command, &alb_fit_command, &alb_render_command, &alb_compare_command,
@@ -35,11 +34,9 @@ static void help(void)
 // end up inside it. Such a stream is filled so that using it fails.
 static void fill_closed_streams(void)
 {
-    int descriptor = open("/dev/null", O_WRONLY);
-    while (descriptor == 0 || descriptor == 1 || descriptor == 2)
-        descriptor = open("/dev/null", O_RDONLY);
-    if (descriptor > 2)
-        close(descriptor);
+    for (int stream = 0; stream <= 2; stream++)
+        if (fcntl(stream, F_GETFD) < 0) // the lowest one that is free, so it becomes this one
+            (void)!open("/dev/null", stream ? O_RDONLY : O_WRONLY);
 }
 
 // The exit code once all that was printed has left; output that cannot be written is an error of its own.

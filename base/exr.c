@@ -16,12 +16,15 @@ typedef struct reader {
     char problem[256]; // the library's latest message
 } reader;
 
+// The library tells of a failure while it holds the context's lock, so that the context cannot be asked whose it is:
+// the thread knows. (A full disk would otherwise wait for itself.)
+static _Thread_local reader *current;
+
 static void keep_message(exr_const_context_t context, exr_result_t code, const char *message)
 {
-    void *user = NULL;
-    (void)code;
-    if (context && exr_get_user_data(context, &user) == EXR_ERR_SUCCESS && user)
-        snprintf(((reader *)user)->problem, sizeof((reader *)user)->problem, "%s", message);
+    (void)context, (void)code;
+    if (current)
+        snprintf(current->problem, sizeof current->problem, "%s", message);
 }
 
 bool alb_exr_is(const void *bytes, size_t size) { return size >= 4 && !memcmp(bytes, "\x76\x2f\x31\x01", 4); }
@@ -143,12 +146,12 @@ bool alb_exr_read(alb_image *image, const char *path, alb_error *error)
     reader r = {.path = path};
     exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
     options.error_handler_fn = keep_message;
-    options.user_data = &r;
     options.max_image_width = options.max_image_height = 1 << 20;
     options.max_tile_width = options.max_tile_height = 1 << 14;
     if (!alb_file_exists(path))
         return alb_fail(error, ALB_ACCESS, "%s: no such file", path);
     bool ok = false;
+    current = &r;
     const exr_result_t code = exr_start_read(&r.context, path, &options);
     if (code) {
         damaged(&r, code, error);
@@ -166,6 +169,7 @@ done:
         exr_decoding_destroy(r.context, &r.decoder);
     if (r.context)
         exr_finish(&r.context);
+    current = NULL;
     if (!ok)
         alb_image_free(image);
     return ok;
@@ -243,9 +247,9 @@ bool alb_exr_write(const alb_image *image, const char *provenance, const char *p
     reader r = {.path = path}; // only its message is used
     exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
     options.error_handler_fn = keep_message;
-    options.user_data = &r;
     if (!alb_file_begin(temporary, path, error))
         return false;
+    current = &r;
     exr_result_t code = exr_start_write(&r.context, temporary, EXR_WRITE_FILE_DIRECTLY, &options);
     if (!code)
         code = write_file(image, provenance, r.context);
@@ -253,6 +257,7 @@ bool alb_exr_write(const alb_image *image, const char *provenance, const char *p
         const exr_result_t finished = exr_finish(&r.context);
         code = code ? code : finished;
     }
+    current = NULL;
     if (code) {
         alb_file_abandon(temporary);
         return alb_fail(error, ALB_ACCESS, "%s: cannot be written: %s", path,

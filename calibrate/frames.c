@@ -17,7 +17,11 @@ bool alb_frame_read(alb_image *frame, const alb_session *session, const alb_shot
     const size_t count = (size_t)frame->width * (size_t)frame->height * (size_t)frame->channels;
     for (size_t i = 0; i < count; i++)
         bad += isfinite(frame->pixels[i]) ? 0 : 1;
-    if (!same)
+    if (!same && frame->width == session->width && frame->height == session->height &&
+        frame->channels == session->channels)
+        alb_fail(error, ALB_BAD_DATA, "%s: its channels do not have the names that session.json says (%s%s%s)", path,
+                 session->channel_names[0], session->channels > 1 ? ", " : "", session->channel_names[1]);
+    else if (!same)
         alb_fail(error, ALB_BAD_DATA, "%s: %d x %d with %d channels, but session.json says %d x %d with %d", path,
                  frame->width, frame->height, frame->channels, session->width, session->height, session->channels);
     else if (bad)

@@ -2,55 +2,11 @@
 // no crash, and whatever an earlier run left behind stays as it was, byte for byte.
 #include "base/exr.h"
 #include "base/file.h"
-#include "check.h"
+#include "program.h"
 
 #include <dirent.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
-
-static char *output, *complaint; // of the last run
-
-static char *slurp(const char *path)
-{
-    alb_error error = {0};
-    char *bytes = NULL;
-    size_t size;
-    check_ok(alb_file_read(&bytes, &size, path, &error), &error);
-    return bytes;
-}
-
-// Exit code of `alabaster ARGUMENTS`; 128 + signal where it died, 124 where it hung.
-static int run(const char *arguments)
-{
-    char command[2048];
-    free(output);
-    free(complaint);
-    snprintf(command, sizeof command, "timeout 60 '%s' %s >cli_out.tmp 2>cli_err.tmp", ALB_PROGRAM, arguments);
-    const int status = system(command);
-    output = slurp("cli_out.tmp");
-    complaint = slurp("cli_err.tmp");
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-}
-
-static void save(const char *path, const void *bytes, size_t size)
-{
-    alb_error error = {0};
-    check_ok(alb_file_write(path, bytes, size, &error), &error);
-}
-
-static void save_text(const char *path, const char *text) { save(path, text, strlen(text)); }
-
-// The first half of a file under another name.
-static void cut(const char *to, const char *from)
-{
-    alb_error error = {0};
-    char *bytes;
-    size_t size;
-    check_ok(alb_file_read(&bytes, &size, from, &error), &error);
-    save(to, bytes, size / 2);
-    free(bytes);
-}
 
 typedef enum look { FLAT, SPOT, ALL_NAN, CLIPPED, SOME_NAN } look;
 
@@ -183,10 +139,7 @@ static int make_inputs(void **state)
 static int remove_inputs(void **state)
 {
     (void)state;
-    free(output);
-    free(complaint);
-    remove("cli_out.tmp");
-    remove("cli_err.tmp");
+    forget_runs();
     return system("rm -rf cli") != 0;
 }
 

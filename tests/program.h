@@ -1,0 +1,68 @@
+// Running the real program, and files for it.
+#pragma once
+#include "base/file.h"
+#include "check.h"
+
+#include <sys/wait.h>
+
+static char *output, *complaint; // of the last run
+
+static inline char *slurp(const char *path)
+{
+    alb_error error = {0};
+    char *bytes = NULL;
+    size_t size;
+    check_ok(alb_file_read(&bytes, &size, path, &error), &error);
+    return bytes;
+}
+
+// system() with printf arguments.
+__attribute__((format(printf, 1, 2))) static inline int shell(const char *format, ...)
+{
+    char command[8192];
+    va_list arguments;
+    va_start(arguments, format);
+    assert_true(vsnprintf(command, sizeof command, format, arguments) < (int)sizeof command);
+    va_end(arguments);
+    return system(command);
+}
+
+// Exit code of `alabaster ARGUMENTS`; 128 + signal where it died, 124 where it hung.
+static inline int run(const char *arguments)
+{
+    const int status = shell("timeout 60 '%s' %s >program_out.tmp 2>program_err.tmp", ALB_PROGRAM, arguments);
+    free(output);
+    free(complaint);
+    output = slurp("program_out.tmp");
+    complaint = slurp("program_err.tmp");
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+static inline void save(const char *path, const void *bytes, size_t size)
+{
+    alb_error error = {0};
+    check_ok(alb_file_write(path, bytes, size, &error), &error);
+}
+
+static inline void save_text(const char *path, const char *text) { save(path, text, strlen(text)); }
+
+// The first half of a file under another name.
+static inline void cut(const char *to, const char *from)
+{
+    alb_error error = {0};
+    char *bytes;
+    size_t size;
+    check_ok(alb_file_read(&bytes, &size, from, &error), &error);
+    save(to, bytes, size / 2);
+    free(bytes);
+}
+
+// Removes what runs leave in the working folder.
+static inline void forget_runs(void)
+{
+    free(output);
+    free(complaint);
+    output = complaint = NULL;
+    remove("program_out.tmp");
+    remove("program_err.tmp");
+}
