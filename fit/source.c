@@ -70,9 +70,6 @@ static bool fit_plane(alb_fitting *fitting, const char *from, alb_side side, int
         alb_text_add(notes,
                      "%s: pixels out to %.4g mm of the centre are not measured (saturated); the core is the form's.\n",
                      name, readings->core_mm);
-    if (readings->outer_mm > readings->complete_mm)
-        alb_text_add(notes, "%s: rings beyond %.4g mm are cut by the border of the image.\n", name,
-                     readings->complete_mm);
     return alb_fitting_run(fitting, side, channel, common, error);
 }
 
