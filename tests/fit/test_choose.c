@@ -102,6 +102,33 @@ static void a_third_term(void **state)
     assert_int_equal(taken(ALB_FORM_THREE_EXPONENTIALS, &three, 0.003, 60), 60);
 }
 
+// Decays too close for the noise to tell the three apart, but not for it to see that there are not two: the simpler
+// form is taken with its discrepancy, not three that nobody knows.
+static void close_decays_stay_simple(void **state)
+{
+    (void)state;
+    enum { TRIALS = 20 };
+    int undecided = 0;
+    const alb_profile close = {ALB_FORM_THREE_EXPONENTIALS, {1, 0.5, 1, 0.8, 1, 1.28}};
+    for (unsigned t = 0; t < TRIALS; t++) {
+        alb_random random = alb_random_at(9, 0, t);
+        alb_readings readings = {0};
+        alb_outcome outcome;
+        make(&readings, &close, 12, 0.003, READINGS, &random);
+        choose(&outcome, &readings, 0);
+        assert_true(outcome.fitted.identifiable);
+        check_near(outcome.fitted.total, alb_profile_total(&close), 4.5 * outcome.fitted.total_sd);
+        if (outcome.attempt_count == ALB_ATTEMPTS_MAX &&
+            strstr(outcome.attempts[ALB_ATTEMPTS_MAX - 1].rejected, "fits within the noise, but")) {
+            assert_true(outcome.discrepancy_relative > 0 && outcome.discrepancy_relative < 0.01);
+            undecided++;
+        }
+        alb_readings_free(&readings);
+    }
+    print_message("close decays: three not decided in %d of %d\n", undecided, TRIALS);
+    assert_true(undecided > 0);
+}
+
 // The terms of a positive sum cannot follow a flat top, S = (1 + r + r^2 / 3) e^(-r), however many there are.
 static void flat_top_stays_signed(void **state)
 {
@@ -200,9 +227,9 @@ static void energy_is_kept_where_no_form_fits(void **state)
                       alb_profile_total(&truth), 100 * (outcome.fitted.total / alb_profile_total(&truth) - 1));
         assert_true(outcome.discrepancy_relative > 0.001);
         assert_int_equal(outcome.fitted.profile.form, ALB_FORM_THREE_EXPONENTIALS);
-        // three terms follow two decades of distance, 60 mean free paths, to 5 %; two leave four times as much
+        // three terms follow distances to 60 mean free paths to 5 %; two leave 5 to 35 %
         check_below(outcome.rms_relative, 5 / sigma * (materials[m][0] + materials[m][1]) < 60 ? 0.05 : 0.08);
-        check_relative(outcome.fitted.total, alb_profile_total(&truth), 0.002); // 5 decay lengths leave 0.0003 outside
+        check_relative(outcome.fitted.total, alb_profile_total(&truth), 0.002);
         check_near(outcome.fitted.total, alb_profile_total(&truth), 4 * outcome.fitted.total_sd);
         alb_readings_free(&readings);
     }
@@ -311,6 +338,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(no_more_than_needed),
                                        cmocka_unit_test(as_much_as_needed),
                                        cmocka_unit_test(a_third_term),
+                                       cmocka_unit_test(close_decays_stay_simple),
                                        cmocka_unit_test(flat_top_stays_signed),
                                        cmocka_unit_test(coinciding_decays),
                                        cmocka_unit_test(totals_are_honest),
