@@ -1,8 +1,9 @@
 // alabaster: the table of commands. Each stage's command.c is one row; `alabaster help` prints this table.
 #include "base/command.h"
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
-
+#include <unistd.h>
 
 static const alb_command *const commands[] = {
     &alb_capture_command, &alb_calibrate_command, &alb_fit_command, &alb_render_command, &alb_compare_command,
@@ -30,39 +31,52 @@ static void help(void)
            "help", "says how a command is used");
 }
 
-static int report(const alb_error *error)
+// Started with a standard stream closed, the first file that is opened would take its place and what is printed would
+// end up inside it. Such a stream is filled so that using it fails.
+static void fill_closed_streams(void)
 {
+    int descriptor = open("/dev/null", O_WRONLY);
+    while (descriptor == 0 || descriptor == 1 || descriptor == 2)
+        descriptor = open("/dev/null", O_RDONLY);
+    if (descriptor > 2)
+        close(descriptor);
+}
+
+// The exit code once all that was printed has left; output that cannot be written is an error of its own.
+static int finish(bool ok, alb_error *error)
+{
+    if (ok && (fflush(stdout) != 0 || ferror(stdout)))
+        ok = alb_fail(error, ALB_ACCESS, "standard output cannot be written");
+    if (ok)
+        return ALB_OK;
+    fflush(stdout);
     fprintf(stderr, "alabaster: %s\n", error->text);
     return error->status;
 }
 
 int main(int argc, char **argv)
 {
+    fill_closed_streams();
     alb_error error = {0};
     const char *name = argc > 1 ? argv[1] : "help";
     const bool wants_help = argc > 2 && (!strcmp(argv[2], "--help") || !strcmp(argv[2], "-h"));
     if (!strcmp(name, "--version")) {
         printf("alabaster %s\n", ALB_VERSION);
-        return ALB_OK;
+        return finish(true, &error);
     }
     if (!strcmp(name, "help") || !strcmp(name, "--help") || !strcmp(name, "-h")) {
         if (argc < 3) {
             help();
-            return ALB_OK;
+            return finish(true, &error);
         }
         name = argv[2];
     }
     const alb_command *command = find(name);
-    if (!command) {
-        alb_fail(&error, ALB_USAGE, "no command '%.60s'; alabaster help lists them", name);
-        return report(&error);
-    }
+    if (!command)
+        return finish(alb_fail(&error, ALB_USAGE, "no command '%.60s'; alabaster help lists them", name), &error);
     if (wants_help || name == argv[2]) {
         printf("%s\n", command->usage);
-        return ALB_OK;
+        return finish(true, &error);
     }
-    if (command->run(argc - 2, argv + 2, &error) && fflush(stdout) == 0)
-        return ALB_OK;
-    alb_fail(&error, ALB_ACCESS, "standard output cannot be written");
-    return report(&error);
+    return finish(command->run(argc - 2, argv + 2, &error), &error);
 }

@@ -171,10 +171,23 @@ done:
     return ok;
 }
 
+typedef exr_result_t (*compressor)(exr_encode_pipeline_t *);
+
+// OpenEXRCore 3.1 keeps a block's compressed form when it is exactly as long as the block, and readers, 3.1 itself
+// among them, then take it for the block: about one noisy block in four thousand would come back as garbage.
+static exr_result_t compress_or_keep(exr_encode_pipeline_t *encoder)
+{
+    const exr_result_t code = ((const compressor *)encoder->encoding_user_data)[0](encoder);
+    if (!code && encoder->compressed_bytes == encoder->packed_bytes)
+        memcpy(encoder->compressed_buffer, encoder->packed_buffer, encoder->packed_bytes);
+    return code;
+}
+
 static exr_result_t write_lines(const alb_image *image, exr_context_t context, exr_encode_pipeline_t *encoder)
 {
     exr_result_t code;
     int32_t lines = 0;
+    compressor usual = NULL;
     if ((code = exr_get_scanlines_per_chunk(context, 0, &lines)))
         return code;
     for (int y = 0; y < image->height; y += lines) {
@@ -192,8 +205,14 @@ static exr_result_t write_lines(const alb_image *image, exr_context_t context, e
             channel->user_pixel_stride = image->channels * (int)sizeof(float);
             channel->user_line_stride = image->width * channel->user_pixel_stride;
         }
-        if ((!y && (code = exr_encoding_choose_default_routines(context, 0, encoder))) ||
-            (code = exr_encoding_run(context, 0, encoder)))
+        if (!y) {
+            if ((code = exr_encoding_choose_default_routines(context, 0, encoder)))
+                return code;
+            usual = encoder->compress_fn;
+            encoder->compress_fn = compress_or_keep;
+            encoder->encoding_user_data = &usual;
+        }
+        if ((code = exr_encoding_run(context, 0, encoder)))
             return code;
     }
     return EXR_ERR_SUCCESS;

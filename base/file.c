@@ -12,32 +12,54 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// What a signal handler removes. The one piece of global state: a handler can be told nothing else.
-static char pending[ALB_PATH_SIZE];
-static volatile sig_atomic_t pending_set;
+// What a signal handler removes. The one piece of global state: a handler can be told nothing else. Several threads may
+// each have a file under way; one beyond the table is written all the same, but an interrupt would leave it.
+enum { PENDING_MAX = 16 };
+static char pending[PENDING_MAX][ALB_PATH_SIZE];
+static volatile sig_atomic_t pending_set[PENDING_MAX];
 
 static void remove_pending(int signal_number)
 {
-    if (pending_set)
-        unlink(pending);
+    for (int i = 0; i < PENDING_MAX; i++)
+        if (pending_set[i])
+            unlink(pending[i]);
     signal(signal_number, SIG_DFL);
     raise(signal_number);
 }
 
-static void guard(const char *temporary)
+static void install_handler(void)
 {
     static bool installed;
-    if (!installed) {
-        installed = true;
-        const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
-        for (int i = 0; i < 3; i++) {
-            struct sigaction old;
-            if (!sigaction(numbers[i], NULL, &old) && old.sa_handler == SIG_DFL)
-                signal(numbers[i], remove_pending);
+    const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
+    for (int i = 0; !installed && i < 3; i++) {
+        struct sigaction old;
+        if (!sigaction(numbers[i], NULL, &old) && old.sa_handler == SIG_DFL)
+            signal(numbers[i], remove_pending);
+    }
+    installed = true;
+}
+
+static void guard(const char *temporary)
+{
+#pragma omp critical(alb_file_pending)
+    {
+        int slot = 0;
+        install_handler();
+        while (slot < PENDING_MAX && pending_set[slot])
+            slot++;
+        if (slot < PENDING_MAX) {
+            snprintf(pending[slot], ALB_PATH_SIZE, "%s", temporary);
+            pending_set[slot] = 1;
         }
     }
-    snprintf(pending, sizeof pending, "%s", temporary);
-    pending_set = 1;
+}
+
+static void unguard(const char *temporary)
+{
+#pragma omp critical(alb_file_pending)
+    for (int i = 0; i < PENDING_MAX; i++)
+        if (pending_set[i] && !strcmp(pending[i], temporary))
+            pending_set[i] = 0;
 }
 
 bool alb_file_exists(const char *path) { return access(path, F_OK) == 0; }
@@ -58,7 +80,12 @@ bool alb_file_read(char **bytes, size_t *size, const char *path, alb_error *erro
     if (!file)
         return alb_fail(error, ALB_ACCESS, "%s: cannot be opened: %s", path, strerror(errno));
     struct stat status;
-    capacity = !fstat(fileno(file), &status) && status.st_size > 0 ? (size_t)status.st_size : 0;
+    const bool known = !fstat(fileno(file), &status);
+    if (known && (S_ISCHR(status.st_mode) || S_ISBLK(status.st_mode))) { // may never end
+        alb_fail(error, ALB_ACCESS, "%s: is a device, not a file", path);
+        goto done;
+    }
+    capacity = known && status.st_size > 0 ? (size_t)status.st_size : 0;
     if (capacity > limit) {
         alb_fail(error, ALB_BAD_DATA, "%s: %zu bytes is more than the 2 GiB that are read", path, capacity);
         goto done;
@@ -74,10 +101,11 @@ bool alb_file_read(char **bytes, size_t *size, const char *path, alb_error *erro
         length += fread(content + length, 1, capacity - length, file);
         if (length < capacity)
             break;
-        if ((capacity *= 2) > 2 * limit) {
+        if (capacity > limit) {
             alb_fail(error, ALB_BAD_DATA, "%s: more than the 2 GiB that are read", path);
             goto done;
         }
+        capacity = 2 * capacity < limit ? 2 * capacity : limit + 1;
     }
     if (ferror(file)) {
         alb_fail(error, ALB_ACCESS, "%s: cannot be read: %s", path, strerror(errno));
@@ -93,8 +121,26 @@ done:
     return ok;
 }
 
+bool alb_file_check_target(const char *path, alb_error *error)
+{
+    struct stat status;
+    char folder[ALB_PATH_SIZE];
+    if (!alb_path_folder(folder, path, error))
+        return false;
+    if (!*path || path[strlen(path) - 1] == '/')
+        return alb_fail(error, ALB_ACCESS, "%s: cannot be written: a file's name is wanted, not a folder's", path);
+    if (access(folder, W_OK | X_OK))
+        return alb_fail(error, ALB_ACCESS, "%s: cannot be written: folder %s: %s", path, folder, strerror(errno));
+    if (!stat(path, &status) && !S_ISREG(status.st_mode))
+        return alb_fail(error, ALB_ACCESS, "%s: cannot be written: %s stands there", path,
+                        S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe");
+    return true;
+}
+
 bool alb_file_begin(char temporary[ALB_PATH_SIZE], const char *path, alb_error *error)
 {
+    if (!alb_file_check_target(path, error))
+        return false;
     const int length = snprintf(temporary, ALB_PATH_SIZE, "%s.%ld.tmp", path, (long)getpid());
     if (length < 0 || length >= ALB_PATH_SIZE)
         return alb_fail(error, ALB_USAGE, "path is longer than %d bytes: %.60s...", ALB_PATH_SIZE - 32, path);
@@ -109,14 +155,14 @@ bool alb_file_commit(const char *temporary, const char *path, alb_error *error)
         alb_file_abandon(temporary);
         return alb_fail(error, ALB_ACCESS, "%s: cannot be written: %s", path, strerror(reason));
     }
-    pending_set = 0;
+    unguard(temporary);
     return true;
 }
 
 void alb_file_abandon(const char *temporary)
 {
     unlink(temporary);
-    pending_set = 0;
+    unguard(temporary);
 }
 
 bool alb_file_write(const char *path, const void *bytes, size_t size, alb_error *error)
@@ -172,9 +218,10 @@ bool alb_path_join(char out[ALB_PATH_SIZE], const char *a, const char *b, alb_er
     const size_t size = strlen(a);
     const char *between = !alone && a[size - 1] != '/' ? "/" : "";
     const int length = snprintf(out, ALB_PATH_SIZE, "%s%s%s", alone ? "" : a, alone ? "" : between, b);
-    if (length < 0 || length >= ALB_PATH_SIZE)
-        return alb_fail(error, ALB_USAGE, "path is longer than %d bytes: %.60s...", ALB_PATH_SIZE, b);
-    return true;
+    if (length >= 0 && length < ALB_PATH_SIZE)
+        return true;
+    out[0] = '\0'; // half a path leads elsewhere
+    return alb_fail(error, ALB_USAGE, "path is longer than %d bytes: %.60s...", ALB_PATH_SIZE, b);
 }
 
 bool alb_path_folder(char out[ALB_PATH_SIZE], const char *path, alb_error *error)

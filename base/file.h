@@ -15,6 +15,9 @@ bool alb_file_read(char **bytes, size_t *size, const char *path, alb_error *erro
 bool alb_file_write(const char *path, const void *bytes, size_t size, alb_error *error);
 // The same for a text; refuses a text that ran out of memory. The text stays the caller's.
 bool alb_file_write_text(const char *path, const alb_text *text, alb_error *error);
+// Whether a file could be written there, before the work that makes it: its folder exists and takes files, and what
+// stands at `path` now, if anything, is an ordinary file (a folder or a device is never replaced).
+bool alb_file_check_target(const char *path, alb_error *error);
 // For libraries that write a file themselves: choose the temporary name, then commit (rename) or abandon (remove) it.
 // An interrupt (SIGINT, SIGTERM) removes the temporary file that is open at that moment.
 bool alb_file_begin(char temporary[ALB_PATH_SIZE], const char *path, alb_error *error);
@@ -22,7 +25,7 @@ bool alb_file_commit(const char *temporary, const char *path, alb_error *error);
 void alb_file_abandon(const char *temporary);
 // Makes the directory and its parents; an existing one is fine.
 bool alb_file_make_directory(const char *path, alb_error *error);
-// "a/b" from "a" and "b"; b alone when it is absolute or a is empty.
+// "a/b" from "a" and "b"; b alone when it is absolute or a is empty. Empty where it fails.
 bool alb_path_join(char out[ALB_PATH_SIZE], const char *a, const char *b, alb_error *error);
 // The folder of a path ("." where it has none) and its last component (borrowed from path).
 bool alb_path_folder(char out[ALB_PATH_SIZE], const char *path, alb_error *error);

@@ -7,13 +7,18 @@
 static void string(alb_text *text, const char *value)
 {
     alb_text_add(text, "\"");
-    for (const unsigned char *c = (const unsigned char *)value; *c; c++) {
-        if (*c == '"' || *c == '\\')
-            alb_text_add(text, "\\%c", *c);
-        else if (*c < 0x20)
-            alb_text_add(text, "\\u%04x", *c);
-        else
-            alb_text_add_bytes(text, c, 1);
+    for (const char *c = value; *c;) {
+        const unsigned char byte = (unsigned char)*c;
+        const int size = alb_text_sequence(c);
+        if (byte == '"' || byte == '\\')
+            alb_text_add(text, "\\%c", byte);
+        else if (byte < 0x20)
+            alb_text_add(text, "\\u%04x", byte);
+        else if (size)
+            alb_text_add_bytes(text, c, (size_t)size);
+        else // file names may hold anything; JSON holds UTF-8 alone
+            alb_text_add(text, "\xef\xbf\xbd");
+        c += size ? size : 1;
     }
     alb_text_add(text, "\"");
 }
@@ -115,12 +120,18 @@ void alb_json_estimate(alb_json *json, const char *key, double value, double sd)
 bool alb_provenance_add(alb_provenance *provenance, const char *path, alb_error *error)
 {
     const int count = provenance->input_count, most = (int)(sizeof provenance->inputs / sizeof provenance->inputs[0]);
-    if (count == most)
-        return alb_fail(error, ALB_INTERNAL, "%s: more than %d inputs in one provenance", path, most);
     const char *name = alb_path_name(path);
-    snprintf(provenance->inputs[count].name, sizeof provenance->inputs[count].name, "%.255s", name);
-    if (!alb_hash_file(provenance->inputs[count].sha256, path, error))
+    char sha256[ALB_HASH_SIZE];
+    if (!alb_hash_file(sha256, path, error))
         return false;
+    for (int i = 0; i < count; i++)
+        if (!strcmp(provenance->inputs[i].sha256, sha256) && !strcmp(provenance->inputs[i].name, name))
+            return true;
+    if (count == most)
+        return alb_fail(error, ALB_BAD_DATA, "%s: more than the %d different input files that a result can name", path,
+                        most);
+    snprintf(provenance->inputs[count].name, sizeof provenance->inputs[count].name, "%.255s", name);
+    memcpy(provenance->inputs[count].sha256, sha256, sizeof sha256);
     provenance->input_count++;
     return true;
 }

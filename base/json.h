@@ -18,11 +18,11 @@ typedef struct alb_provenance {
     struct {
         char name[256]; // last component of the path
         char sha256[ALB_HASH_SIZE];
-    } inputs[32];
+    } inputs[64];
     int input_count;
 } alb_provenance;
 
-// Hashes the file and adds it to the inputs.
+// Hashes the file and adds it to the inputs, once however often it is named.
 bool alb_provenance_add(alb_provenance *provenance, const char *path, alb_error *error);
 
 // Opens the top object and writes "format": 1 and, where given, the provenance.

@@ -1,23 +1,5 @@
-// Escaping for SVG and HTML. UTF-8 is checked after RFC 3629: shortest form only, no surrogates, up to U+10FFFF.
+// Escaping for SVG and HTML.
 #include "base/markup.h"
-
-// Bytes of the valid UTF-8 sequence that starts here; 0 where there is none. The text is NUL-terminated.
-static int sequence_length(const unsigned char *s)
-{
-    if (s[0] < 0x80)
-        return 1;
-    const int length = s[0] >= 0xc2 && s[0] < 0xe0   ? 2
-                       : (s[0] & 0xf0) == 0xe0       ? 3
-                       : s[0] >= 0xf0 && s[0] < 0xf5 ? 4
-                                                     : 0;
-    for (int i = 1; i < length; i++)
-        if ((s[i] & 0xc0) != 0x80)
-            return 0;
-    if ((s[0] == 0xe0 && s[1] < 0xa0) || (s[0] == 0xed && s[1] >= 0xa0) || (s[0] == 0xf0 && s[1] < 0x90) ||
-        (s[0] == 0xf4 && s[1] >= 0x90))
-        return 0;
-    return length;
-}
 
 static const char *escape_of(unsigned char c)
 {
@@ -42,7 +24,7 @@ void alb_markup_add(alb_text *markup, const char *plain)
     if (!plain)
         return;
     for (const unsigned char *s = (const unsigned char *)plain; *s;) {
-        const int length = sequence_length(s);
+        const int length = alb_text_sequence((const char *)s);
         const char *escape = length ? escape_of(*s) : "\xef\xbf\xbd";
         if (escape)
             alb_text_add(markup, "%s", escape);
@@ -56,7 +38,7 @@ int alb_markup_length(const char *plain)
 {
     int count = 0;
     for (const unsigned char *s = (const unsigned char *)plain; s && *s; count++) {
-        const int length = sequence_length(s);
+        const int length = alb_text_sequence((const char *)s);
         s += length ? length : 1;
     }
     return count;

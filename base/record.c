@@ -363,6 +363,24 @@ bool alb_node_item_number(double *out, alb_node list, size_t i, double minimum, 
            item_fail(error, list, i, message);
 }
 
+bool alb_node_item_numbers(double *out, size_t count, alb_node list, size_t i, double minimum, double maximum,
+                           alb_error *error)
+{
+    const alb_node row = alb_node_item(list, i);
+    char message[128];
+    if (!json_is_array((const json_t *)row.value))
+        snprintf(message, sizeof message, "expected a list of %zu numbers, found %s", count, type_name(row.value));
+    else if (json_array_size(row.value) != count)
+        snprintf(message, sizeof message, "found %zu numbers, expected %zu", json_array_size(row.value), count);
+    else {
+        for (size_t k = 0; k < count; k++)
+            if (!alb_node_item_number(&out[k], row, k, minimum, maximum, error))
+                return false;
+        return true;
+    }
+    return item_fail(error, list, i, message);
+}
+
 bool alb_node_item_text(const char **out, alb_node list, size_t i, alb_error *error)
 {
     const json_t *value = json_array_get(list.value, i);

@@ -38,6 +38,9 @@ bool alb_node_list(alb_node *out, size_t *count, alb_node object, const char *ke
 // Item i of a list (any type), and that item read as a number or text.
 alb_node alb_node_item(alb_node list, size_t i);
 bool alb_node_item_number(double *out, alb_node list, size_t i, double minimum, double maximum, alb_error *error);
+// Item i of a list, required to be a list of exactly `count` numbers.
+bool alb_node_item_numbers(double *out, size_t count, alb_node list, size_t i, double minimum, double maximum,
+                           alb_error *error);
 bool alb_node_item_text(const char **out, alb_node list, size_t i, alb_error *error);
 // Item i of a list, required to be an object.
 bool alb_node_item_object(alb_node *out, alb_node list, size_t i, alb_error *error);

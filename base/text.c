@@ -50,3 +50,22 @@ void alb_text_free(alb_text *text)
     free(text->bytes);
     *text = (alb_text){0};
 }
+
+// After RFC 3629: shortest form only, no surrogates, up to U+10FFFF.
+int alb_text_sequence(const char *at)
+{
+    const unsigned char *s = (const unsigned char *)at;
+    if (s[0] < 0x80)
+        return 1;
+    const int length = s[0] >= 0xc2 && s[0] < 0xe0   ? 2
+                       : (s[0] & 0xf0) == 0xe0       ? 3
+                       : s[0] >= 0xf0 && s[0] < 0xf5 ? 4
+                                                     : 0;
+    for (int i = 1; i < length; i++)
+        if ((s[i] & 0xc0) != 0x80)
+            return 0;
+    if ((s[0] == 0xe0 && s[1] < 0xa0) || (s[0] == 0xed && s[1] >= 0xa0) || (s[0] == 0xf0 && s[1] < 0x90) ||
+        (s[0] == 0xf4 && s[1] >= 0x90))
+        return 0;
+    return length;
+}

@@ -13,3 +13,5 @@ typedef struct alb_text {
 void alb_text_add(alb_text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void alb_text_add_bytes(alb_text *text, const void *bytes, size_t size);
 void alb_text_free(alb_text *text);
+// Bytes of the valid UTF-8 sequence that starts here; 0 where there is none. The text is NUL-terminated.
+int alb_text_sequence(const char *at);

@@ -219,8 +219,8 @@ extern "C" bool alb_vision_calibrate(alb_lens_estimate *estimate, alb_transform 
             seen.push_back(pixels(corners + 2 * v * points, points));
         cv::Mat k, d, sd_lens, sd_pose, errors;
         std::vector<cv::Mat> rotations, translations;
-        const int fixed = (terms < 1 ? cv::CALIB_FIX_K1 : 0) | (terms < 2 ? cv::CALIB_FIX_K2 : 0) |
-                          (terms < 4 ? cv::CALIB_ZERO_TANGENT_DIST : 0) | (terms < 5 ? cv::CALIB_FIX_K3 : 0);
+        const int fixed = (terms < 2 ? cv::CALIB_FIX_K2 : 0) | (terms < 4 ? cv::CALIB_ZERO_TANGENT_DIST : 0) |
+                          (terms < 5 ? cv::CALIB_FIX_K3 : 0);
         estimate->rms_px = cv::calibrateCamera(known, seen, cv::Size(width, height), k, d, rotations, translations,
                                                sd_lens, sd_pose, errors, fixed);
         estimate->lens = {width,

@@ -23,7 +23,7 @@ typedef struct alb_lens_estimate {
 
 // Intrinsics and poses from `views` photographs of one board: corners[view][point][2] pixels, board[point][2] mm (z =
 // 0). poses (views, camera_from_board) and view_rms_px (views) are filled. OpenCV's calibrateCamera with `terms`
-// coefficients of distortion free and the rest zero: 0 none, 1 k1, 2 k1 k2, 4 k1 k2 p1 p2, 5 all.
+// coefficients of distortion free and the rest zero: 1 k1, 2 k1 k2, 4 k1 k2 p1 p2, 5 all.
 bool alb_vision_calibrate(alb_lens_estimate *estimate, alb_transform *poses, double *view_rms_px, const double *corners,
                           const double *board, int views, int points, int width, int height, int terms,
                           alb_error *error);

@@ -137,6 +137,17 @@ static bool read_lens(alb_calibration *c, alb_node root, alb_error *error)
     return true;
 }
 
+static bool is_rotation(double r[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const double dot = r[i][0] * r[j][0] + r[i][1] * r[j][1] + r[i][2] * r[j][2];
+            if (fabs(dot - (i == j)) > 1e-6)
+                return false;
+        }
+    return true;
+}
+
 static bool read_views(alb_calibration *c, alb_node root, alb_error *error)
 {
     alb_node views, node, rows;
@@ -158,9 +169,10 @@ static bool read_views(alb_calibration *c, alb_node root, alb_error *error)
         if (count != 3)
             return alb_node_fail(error, node, "rotation", "expected 3 rows, found %zu", count);
         for (size_t i = 0; i < 3; i++)
-            for (size_t j = 0; j < 3; j++)
-                if (!alb_node_item_number(&t->rotation[i][j], alb_node_item(rows, i), j, -1.0001, 1.0001, error))
-                    return false;
+            if (!alb_node_item_numbers(t->rotation[i], 3, rows, i, -1.0001, 1.0001, error))
+                return false;
+        if (!is_rotation(t->rotation))
+            return alb_node_fail(error, node, "rotation", "its rows are not three unit vectors at right angles");
     }
     return true;
 }
@@ -237,9 +249,8 @@ static bool read_all(alb_calibration *c, alb_node root, alb_error *error)
     if (count != (size_t)c->channels)
         return alb_node_fail(error, root, "flat", "expected a row for each channel, found %zu", count);
     for (size_t i = 0; i < count; i++)
-        for (size_t j = 0; j < 3; j++)
-            if (!alb_node_item_number(&c->flat[i][j], alb_node_item(list, i), j, -1e3, 1e3, error))
-                return false;
+        if (!alb_node_item_numbers(c->flat[i], 3, list, i, -1e3, 1e3, error))
+            return false;
     if (!alb_node_list(&list, &count, root, "products", error))
         return false;
     if (count > ALB_SHOTS_MAX)

@@ -152,7 +152,7 @@ static bool calibrate_session(const char *folder, bool as_json, alb_error *error
 static bool board_size(alb_board *board, const char *text, const char *square, alb_error *error)
 {
     char rest;
-    if (sscanf(text, "%dx%d%c", &board->columns, &board->rows, &rest) != 2)
+    if (sscanf(text, "%4dx%4d%c", &board->columns, &board->rows, &rest) != 2)
         return alb_fail(error, ALB_USAGE, "--board %.60s: expected COLUMNSxROWS, such as 9x6", text);
     return alb_option_number(&board->square_mm, "--square-mm", square, 1e-6, 1e6, error);
 }

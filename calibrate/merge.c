@@ -102,9 +102,18 @@ bool alb_merge_shot(alb_image *merged, const alb_session *session, const alb_sho
     for (int e = 0; e < shot->exposure_count; e++) {
         means[e] = alb_allocate(count, sizeof *means[e], error);
         clipped[e] = alb_allocate(count, 1, error);
-        if (!means[e] || !clipped[e] || !sum_frames(means[e], clipped[e], session, shot, e, error))
+        if (!means[e] || !clipped[e])
             goto done;
     }
+    alb_error reasons[ALB_EXPOSURES_MAX] = {{0}};
+#pragma omp parallel for schedule(dynamic)
+    for (int e = 0; e < shot->exposure_count; e++)
+        sum_frames(means[e], clipped[e], session, shot, e, &reasons[e]);
+    for (int e = 0; e < shot->exposure_count; e++)
+        if (reasons[e].status != ALB_OK) {
+            alb_fail(error, reasons[e].status, "%s", reasons[e].text);
+            goto done;
+        }
 #pragma omp parallel for schedule(static)
     for (int y = 0; y < session->height; y++)
         merge_row(merged, y, means, clipped, session, shot, noise);

@@ -115,7 +115,9 @@ bool alb_products_make(alb_calibration *calibration, alb_image images[ALB_SHOTS_
         const int at = calibration->product_count;
         if (!linear_image(&images[at], calibration, session, shot, noise, error))
             return false;
-        const double factor[3] = {1 / flux[white][0].value, 1 / flux[white][1].value, 1 / flux[white][2].value};
+        double factor[3];
+        for (int i = 0; i < calibration->channels; i++)
+            factor[i] = 1 / flux[white][i].value;
         multiply(&images[at], factor, calibration->channels);
         add_product(calibration, shot, flux[white]);
     }

@@ -24,7 +24,7 @@ void alb_board_views_free(alb_board_views *views);
 // Looks for the board in one photograph (any channels: their mean) and adds it to the views.
 bool alb_board_look(alb_board_views *views, const alb_image *photograph, const char *name, const alb_board *board,
                     alb_error *error);
-// The lens from all views found, at least 3, with as many coefficients of distortion as lower BIC; *terms says how
+// The lens from all views found, at least 3, with as many coefficients of distortion as lower AIC; *terms says how
 // many. ALB_BAD_DATA says how many views were found.
 bool alb_board_lens(alb_lens_estimate *estimate, int *terms, alb_board_views *views, const alb_board *board, int width,
                     int height, alb_error *error);

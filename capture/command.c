@@ -64,20 +64,55 @@ static bool write_camera(const alb_session *session, alb_error *error)
     return alb_json_write(&json, path, error);
 }
 
-static bool capture_frame(frame_level *level, const alb_rig *rig, void *state, const alb_session *session, int shot,
-                          int exposure, int repeat, alb_error *error)
-{
-    alb_image frame = {0};
+// A frame on its way to its file.
+typedef struct outgoing {
+    alb_image frame;
     char path[ALB_PATH_SIZE];
-    const bool ok = alb_session_frame(path, session, &session->plan.shots[shot], exposure, repeat, error) &&
-                    rig->capture(&frame, state, session, shot, exposure, repeat, error) &&
-                    alb_exr_write(&frame, NULL, path, error);
-    if (ok && repeat == 0)
-        *level = measure(&frame, session->white_level_dn);
-    alb_image_free(&frame);
-    if (ok && interrupted)
-        return alb_fail(error, ALB_ACCESS, "interrupted; nothing was changed");
+    frame_level *level; // NULL: not asked for
+    alb_error error;
+} outgoing;
+
+// Frames are taken one after the other and written a few at a time, for compressing them takes longer.
+enum { OUTGOING_MAX = 4 };
+typedef struct queue {
+    outgoing frames[OUTGOING_MAX];
+    int count;
+} queue;
+
+// Writes and empties the queue; the first error in the order of the frames.
+static bool write_queue(queue *queued, const alb_session *session, alb_error *error)
+{
+    bool ok = true;
+#pragma omp parallel for schedule(dynamic)
+    for (int i = 0; i < queued->count; i++) {
+        outgoing *out = &queued->frames[i];
+        if (alb_exr_write(&out->frame, NULL, out->path, &out->error) && out->level)
+            *out->level = measure(&out->frame, session->white_level_dn);
+    }
+    for (int i = 0; i < queued->count; i++) {
+        const alb_error *reason = &queued->frames[i].error;
+        if (ok && reason->status != ALB_OK)
+            ok = alb_fail(error, reason->status, "%s", reason->text);
+        alb_image_free(&queued->frames[i].frame);
+    }
+    queued->count = 0;
     return ok;
+}
+
+static bool capture_frame(queue *queued, frame_level *level, const alb_rig *rig, void *state,
+                          const alb_session *session, int shot, int exposure, int repeat, alb_error *error)
+{
+    outgoing *out = &queued->frames[queued->count];
+    *out = (outgoing){.level = repeat == 0 ? level : NULL};
+    if (!alb_session_frame(out->path, session, &session->plan.shots[shot], exposure, repeat, error) ||
+        !rig->capture(&out->frame, state, session, shot, exposure, repeat, error)) {
+        alb_image_free(&out->frame);
+        return false;
+    }
+    queued->count++;
+    if (interrupted)
+        return alb_fail(error, ALB_ACCESS, "interrupted; nothing was changed");
+    return queued->count < OUTGOING_MAX || write_queue(queued, session, error);
 }
 
 // levels[shot * ALB_EXPOSURES_MAX + exposure]
@@ -86,17 +121,24 @@ static bool capture_frames(frame_level *levels, const alb_rig *rig, void *state,
 {
     const alb_plan *plan = &session->plan;
     alb_progress progress;
-    bool ok = true;
+    queue *queued = alb_allocate(1, sizeof *queued, error);
+    bool ok = queued != NULL;
     int done = 0;
     alb_progress_begin(&progress, "capture", frame_count(plan));
     for (int shot = 0; shot < plan->shot_count; shot++)
         for (int repeat = 0; repeat < plan->shots[shot].repeats; repeat++)
             for (int exposure = 0; ok && exposure < plan->shots[shot].exposure_count; exposure++) {
-                ok = capture_frame(&levels[shot * ALB_EXPOSURES_MAX + exposure], rig, state, session, shot, exposure,
-                                   repeat, error);
+                ok = capture_frame(queued, &levels[shot * ALB_EXPOSURES_MAX + exposure], rig, state, session, shot,
+                                   exposure, repeat, error);
                 alb_progress_at(&progress, ++done);
             }
+    ok = ok && write_queue(queued, session, error);
+    for (int i = 0; queued && i < queued->count; i++)
+        alb_image_free(&queued->frames[i].frame);
+    free(queued);
     alb_progress_end(&progress);
+    if (ok && interrupted)
+        return alb_fail(error, ALB_ACCESS, "interrupted; nothing was changed");
     return ok;
 }
 
@@ -138,10 +180,11 @@ static bool store_session(frame_level *levels, const alb_rig *rig, void *state, 
 {
     alb_store store = {0};
     const struct sigaction action = {.sa_handler = interrupt};
-    struct sigaction before[2];
+    struct sigaction before[3];
     interrupted = 0;
     sigaction(SIGINT, &action, &before[0]);
     sigaction(SIGTERM, &action, &before[1]);
+    sigaction(SIGHUP, &action, &before[2]);
     bool ok = alb_store_open(&store, folder, error);
     if (ok)
         strcpy(session->folder, store.partial);
@@ -151,6 +194,7 @@ static bool store_session(frame_level *levels, const alb_rig *rig, void *state, 
     alb_store_close(&store);
     sigaction(SIGINT, &before[0], NULL);
     sigaction(SIGTERM, &before[1], NULL);
+    sigaction(SIGHUP, &before[2], NULL);
     return ok;
 }
 

@@ -13,20 +13,24 @@
 static const double pi = 3.141592653589793;
 enum { POINTS_MOST = 20000 };
 
-static bool inside(const alb_pattern *pattern, int x, int y, int half)
+static bool inside(const alb_pattern *pattern, int x, int y, int across)
 {
-    const double dx = x - half + 0.5, dy = y - half + 0.5;
-    return dx * dx + dy * dy <= 0.25 * pattern->diameter_px * pattern->diameter_px;
+    const double dx = x - 0.5 * (across - 1), dy = y - 0.5 * (across - 1);
+    return across == 1 || dx * dx + dy * dy <= 0.25 * pattern->diameter_px * pattern->diameter_px;
 }
 
 // Lists a disc's pixels and the points inside them.
 static bool fill_disc(alb_lit_face *face, const alb_pattern *pattern, alb_error *error)
 {
-    const int half = (int)ceil(pattern->diameter_px / 2), n = (int)ceil(face->pixel_mm / (0.8 * face->blur_sd_mm));
+    const int across = (int)ceil(pattern->diameter_px), n = (int)ceil(face->pixel_mm / (0.8 * face->blur_sd_mm));
     const double p = face->pixel_mm;
     long pixels = 0;
-    for (int i = 0; i < 4 * half * half; i++)
-        pixels += inside(pattern, i % (2 * half), i / (2 * half), half);
+    for (int i = 0; i < across * across; i++)
+        pixels += inside(pattern, i % across, i / across, across);
+    if (!pixels)
+        return alb_fail(error, ALB_BAD_DATA,
+                        "a disc of diameter_px %g holds the centre of no pixel; 1, or 1.42 and more",
+                        pattern->diameter_px);
     const long points = pixels * n * n, discs = face->disc_count;
     if (points * discs > POINTS_MOST)
         return alb_fail(error, ALB_BAD_DATA,
@@ -37,10 +41,10 @@ static bool fill_disc(alb_lit_face *face, const alb_pattern *pattern, alb_error 
     face->point = alb_allocate((size_t)points, sizeof *face->point, error);
     if (!face->pixel || !face->point)
         return false;
-    for (int i = 0; i < 4 * half * half; i++) {
-        if (!inside(pattern, i % (2 * half), i / (2 * half), half))
+    for (int i = 0; i < across * across; i++) {
+        if (!inside(pattern, i % across, i / across, across))
             continue;
-        const double x = (i % (2 * half) - half + 0.5) * p, y = (i / (2 * half) - half + 0.5) * p; // NOLINT: whole rows
+        const double x = (i % across - 0.5 * (across - 1)) * p, y = ((double)(i / across) - 0.5 * (across - 1)) * p;
         face->pixel[face->pixel_count][0] = x;
         face->pixel[face->pixel_count++][1] = y;
         face->disc_radius_mm = fmax(face->disc_radius_mm, hypot(x, y) + p);

@@ -1,7 +1,8 @@
 // What a lit face sheds: the projector's pattern on the white reference and on the slab.
 //
 // The projector lights the front perpendicularly. A disc consists of the square pixels whose centres lie within
-// diameter/2 of its middle, each blurred by a Gaussian. Patterns lie symmetrically about the origin, so that the far
+// diameter/2 of its middle (the corner of four pixels where the diameter, rounded up, is even; the centre of one where
+// it is odd), each blurred by a Gaussian. Patterns lie symmetrically about the origin, so that the far
 // side, which sees them mirrored, sees the same.
 #pragma once
 #include "capture/kernel.h"

@@ -9,6 +9,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 static int remove_one(const char *path, const struct stat *status, int kind, struct FTW *walk)
@@ -68,12 +69,20 @@ bool alb_store_check(const char *folder, const char *rig, const alb_provenance *
 bool alb_store_open(alb_store *store, const char *folder, alb_error *error)
 {
     char frames[ALB_PATH_SIZE];
+    char partial[ALB_PATH_SIZE];
     *store = (alb_store){.made_folder = !alb_file_exists(folder)};
-    if (!alb_path_join(store->partial, folder, "capture.partial", error) ||
-        !alb_path_join(frames, store->partial, "frames", error))
+    if (!alb_path_join(partial, folder, "capture.partial", error) || !alb_path_join(frames, partial, "frames", error) ||
+        !alb_file_make_directory(folder, error))
         return false;
     strcpy(store->folder, folder); // shorter than partial
-    remove_tree(store->partial);
+    const int descriptor = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (descriptor < 0)
+        return alb_fail(error, ALB_ACCESS, "%s: cannot be opened: %s", folder, strerror(errno));
+    store->lock = descriptor + 1;
+    if (flock(descriptor, LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK)
+        return alb_fail(error, ALB_ACCESS, "%s: another capture is writing there; wait for it to end", folder);
+    strcpy(store->partial, partial); // from here on it is this capture's
+    remove_tree(partial);
     return alb_file_make_directory(frames, error);
 }
 
@@ -111,5 +120,7 @@ void alb_store_close(alb_store *store)
         remove_tree(store->partial);
     if (store->made_folder)
         rmdir(store->folder); // where it is empty, as it was not there before
+    if (store->lock)
+        close(store->lock - 1);
     *store = (alb_store){0};
 }

@@ -6,16 +6,23 @@
 #include <stdio.h>
 #include <string.h>
 
-bool alb_fitting_run(alb_fitting *fitting, alb_side side, int channel, alb_common_sd common, alb_error *error)
+bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
 {
-    alb_measurement *measurement = &fitting->sides[side][channel];
-    alb_error reason = {0};
-    measurement->measured =
-        alb_choose(&measurement->outcome, &measurement->readings, &measurement->forward, common, &reason);
-    if (!measurement->measured)
-        return alb_fail(error, reason.status, "%s %s: %s", alb_side_names[side],
-                        fitting->material.channel_names[channel], reason.text);
-    fitting->material.fitted[side][channel] = measurement->outcome.fitted;
+    alb_error reasons[ALB_SIDES * 3] = {{0}};
+#pragma omp parallel for schedule(dynamic)
+    for (int i = 0; i < ALB_SIDES * 3; i++) {
+        alb_measurement *measurement = &fitting->sides[i / 3][i % 3];
+        if (!measurement->forward.grid_mm)
+            continue;
+        measurement->measured = alb_choose(&measurement->outcome, &measurement->readings, &measurement->forward,
+                                           measurement->common, &reasons[i]);
+        if (measurement->measured)
+            fitting->material.fitted[i / 3][i % 3] = measurement->outcome.fitted;
+    }
+    for (int i = 0; i < ALB_SIDES * 3; i++)
+        if (reasons[i].status != ALB_OK)
+            return alb_fail(error, reasons[i].status, "%s %s: %s", alb_side_names[i / 3],
+                            fitting->material.channel_names[i % 3], reasons[i].text);
     return true;
 }
 
@@ -165,9 +172,8 @@ static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
     if (row_count != (size_t)n)
         return alb_node_fail(error, node, "covariance", "%zu rows for %d parameters", row_count, n);
     for (size_t p = 0; p < row_count; p++)
-        for (size_t q = 0; q < row_count; q++)
-            if (!alb_node_item_number(&fitted->covariance[p][q], alb_node_item(rows, p), q, -1e300, 1e300, error))
-                return false;
+        if (!alb_node_item_numbers(fitted->covariance[p], row_count, rows, p, -1e300, 1e300, error))
+            return false;
     return true;
 }
 
@@ -195,7 +201,7 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
         return false;
     fitted->degrees_of_freedom = (int)freedom;
     const double expected = alb_profile_total(&fitted->profile);
-    if (fabs(fitted->total - expected) > 1e-6 * expected)
+    if (!isfinite(expected) || fabs(fitted->total - expected) > 1e-6 * expected)
         return alb_node_fail(error, node, "total", "%g does not belong to the parameters, whose total is %g",
                              fitted->total, expected);
     return true;

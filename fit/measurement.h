@@ -7,6 +7,7 @@ typedef struct alb_measurement {
     bool measured;
     alb_readings readings;
     alb_operator forward;
+    alb_common_sd common;
     alb_outcome outcome;
 } alb_measurement;
 
@@ -16,8 +17,8 @@ typedef struct alb_fitting {
     alb_measurement sides[ALB_SIDES][3];
 } alb_fitting;
 
-// Fits one side and channel whose readings and forward model are there.
-bool alb_fitting_run(alb_fitting *fitting, alb_side side, int channel, alb_common_sd common, alb_error *error);
+// Fits every side and channel whose readings and forward model are there.
+bool alb_fitting_run(alb_fitting *fitting, alb_error *error);
 void alb_fitting_free(alb_fitting *fitting);
 
 // Puts the content of material.json into an open object.

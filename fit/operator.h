@@ -15,7 +15,9 @@ bool alb_operator_create(alb_operator *forward, const alb_readings *readings, co
 // Readings that are values of S at their distances.
 bool alb_operator_identity(alb_operator *forward, const alb_readings *readings, alb_error *error);
 void alb_operator_free(alb_operator *forward);
-// out[row] = sum_k weight S(grid_k).
-void alb_operator_apply(double *out, const alb_operator *forward, const double *on_grid);
+// out[row][c] = sum_k weight on_grid[k][c], four columns at once.
+enum { ALB_OPERATOR_COLUMNS = 4 };
+void alb_operator_apply(double (*out)[ALB_OPERATOR_COLUMNS], const alb_operator *forward,
+                        const double (*on_grid)[ALB_OPERATOR_COLUMNS]);
 // The readings of a profile; free with free().
 double *alb_operator_readings(const alb_operator *forward, const alb_profile *profile, alb_error *error);

@@ -40,39 +40,77 @@ double alb_weighing_reading(const alb_weighing *weighing, int i)
 }
 
 // Whitened model and its derivatives by the form's own parameters: values[0] the model, values[1 + p] the derivatives.
+// All come from the readings of e^(-b r) and r e^(-b r) of the terms: two columns of the operator each, one application
+// for two terms, a second for the third.
+enum { BLOCKS = (PARAMETERS + ALB_OPERATOR_COLUMNS - 1) / ALB_OPERATOR_COLUMNS };
+
 typedef struct model {
     const alb_weighing *weighing;
     alb_candidate candidate;
-    double *on_grid[1 + PARAMETERS], *values[1 + PARAMETERS];
-    double *block;
+    bool known; // the values are those of `at`
+    double at[PARAMETERS];
+    double (*on_grid)[ALB_OPERATOR_COLUMNS], (*columns[BLOCKS])[ALB_OPERATOR_COLUMNS];
+    double *values[1 + PARAMETERS];
 } model;
+
+static void model_free(model *m)
+{
+    free(m->on_grid);
+    free(m->columns[0]);
+    free(m->values[0]);
+    *m = (model){0};
+}
 
 static bool model_create(model *out, alb_candidate candidate, const alb_weighing *weighing, alb_error *error)
 {
     const size_t grid = (size_t)weighing->forward->grid_count, rows = (size_t)weighing->readings->count + 1;
     *out = (model){.weighing = weighing, .candidate = candidate};
-    out->block = alb_allocate((1 + PARAMETERS) * (grid + rows), sizeof(double), error);
-    for (size_t p = 0; out->block && p < 1 + PARAMETERS; p++) {
-        out->on_grid[p] = out->block + p * (grid + rows);
-        out->values[p] = out->on_grid[p] + grid;
+    if (!(out->on_grid = alb_allocate(grid, sizeof *out->on_grid, error)) ||
+        !(out->columns[0] = alb_allocate(BLOCKS * rows, sizeof *out->columns[0], error)) ||
+        !(out->values[0] = alb_allocate((1 + PARAMETERS) * rows, sizeof(double), error))) {
+        model_free(out);
+        return false;
     }
-    return out->block != NULL;
+    for (int block = 1; block < BLOCKS; block++)
+        out->columns[block] = out->columns[block - 1] + rows;
+    for (int p = 1; p <= PARAMETERS; p++)
+        out->values[p] = out->values[p - 1] + rows;
+    return true;
+}
+
+// Readings of e^(-b r) and r e^(-b r) of the terms from parameter `from` on, as many as go together.
+static void apply_terms(model *m, const double *p, int from, int parameters)
+{
+    const alb_operator *forward = m->weighing->forward;
+    const int together = parameters - from < ALB_OPERATOR_COLUMNS ? parameters - from : ALB_OPERATOR_COLUMNS;
+    for (int k = 0; k < forward->grid_count; k++)
+        for (int t = 0; t < together; t += 2) {
+            const double e = exp(-p[from + t + 1] * forward->grid_mm[k]);
+            m->on_grid[k][t] = e;
+            m->on_grid[k][t + 1] = forward->grid_mm[k] * e;
+        }
+    alb_operator_apply(m->columns[from / ALB_OPERATOR_COLUMNS], forward,
+                       (const double(*)[ALB_OPERATOR_COLUMNS])m->on_grid);
 }
 
 static void model_evaluate(model *m, const alb_profile *profile)
 {
-    const alb_operator *forward = m->weighing->forward;
     const alb_readings *readings = m->weighing->readings;
     const int n = readings->count, parameters = alb_form_parameter_count(profile->form);
-    for (int k = 0; k < forward->grid_count; k++) {
-        double gradient[ALB_PARAMETERS_MAX];
-        m->on_grid[0][k] = alb_profile_gradient(gradient, profile, forward->grid_mm[k]);
-        for (int p = 0; p < parameters; p++)
-            m->on_grid[1 + p][k] = gradient[p];
+    const double *p = profile->parameters;
+    for (int from = 0; from < parameters; from += ALB_OPERATOR_COLUMNS)
+        apply_terms(m, p, from, parameters);
+    for (int i = 0; i < n; i++) {
+        m->values[0][i] = 0;
+        for (int t = 0; t < parameters; t += 2) {
+            const double *column = m->columns[t / ALB_OPERATOR_COLUMNS][i] + t % ALB_OPERATOR_COLUMNS;
+            m->values[0][i] += p[t] * column[0];
+            m->values[1 + t][i] = column[0];
+            m->values[2 + t][i] = -p[t] * column[1];
+        }
     }
-    for (int p = 0; p <= parameters; p++) {
-        double *values = m->values[p];
-        alb_operator_apply(values, forward, m->on_grid[p]);
+    for (int q = 0; q <= parameters; q++) {
+        double *values = m->values[q];
         values[n] = m->weighing->energy_sd > 0 ? alb_energy(readings, values) / m->weighing->energy_sd : 0;
         for (int i = 0; i < n; i++)
             values[i] /= m->weighing->sd[i];
@@ -112,12 +150,17 @@ static void solver_of(double *u, const alb_profile *profile)
 
 static void evaluate(double *residuals, double *jacobian, const double *u, const void *context)
 {
-    const model *m = context;
+    model *m = (model *)context;
     double chain[PARAMETERS][PARAMETERS];
     const alb_profile profile = profile_of(chain, m->candidate, u);
-    model_evaluate((model *)m, &profile);
     const int all = alb_form_parameter_count(m->candidate.form), rows = alb_weighing_rows(m->weighing);
     const int free_parameters = alb_candidate_parameters(m->candidate);
+    const size_t size = (size_t)free_parameters * sizeof *u;
+    if (!m->known ||
+        memcmp(m->at, u, size) != 0) // the solver asks for the residuals first, then for the Jacobian there
+        model_evaluate(m, &profile);
+    m->known = true;
+    memcpy(m->at, u, size);
     for (int i = 0; i < rows; i++) {
         residuals[i] = m->values[0][i] - alb_weighing_reading(m->weighing, i);
         for (int q = 0; jacobian && q < free_parameters; q++) {
@@ -170,7 +213,7 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate c
     const bool ok = alb_solve(u, chi_square, &problem, error);
     *profile = profile_of(chain, candidate, u);
     order_terms(profile);
-    free(m.block);
+    model_free(&m);
     return ok;
 }
 
@@ -256,7 +299,7 @@ bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_
             for (int q = 0; q < n; q++)
                 matrix[p][q] += row[p] * row[q];
     }
-    free(m.block);
+    model_free(&m);
     *full_rank = true;
     for (int p = 0; p < n; p++) {
         scale[p] = sqrt(matrix[p][p]);

@@ -51,26 +51,57 @@ static bool plane_take(plane *out, const alb_image *image, const char *channel, 
     return true;
 }
 
-// Observes one channel of an image, builds the forward model and fits. Errors call the image `from`; notes, which end
-// up in derived files, do not.
-static bool fit_plane(alb_fitting *fitting, const char *from, alb_side side, int channel, const alb_face *face,
-                      const plane *pixels, const alb_spot *spot, alb_common_sd common, alb_text *notes,
-                      alb_error *error)
+// An image of a lit spot, and what its channels are read with. Errors call it `from`; notes, which end up in derived
+// files, do not.
+typedef struct photo {
+    const char *from;
+    alb_side side;
+    const alb_image *image;
+    const alb_face *face;
+    const alb_spot *spots[3];
+    double factor, saturation;
+} photo;
+
+// Observes one channel and builds its forward model.
+static bool observe_channel(alb_fitting *fitting, const photo *seen, int channel, alb_text *notes, alb_error *error)
 {
     char name[64], full_name[1024];
-    alb_measurement *measurement = &fitting->sides[side][channel];
-    snprintf(name, sizeof name, "%s %s", alb_side_names[side], fitting->material.channel_names[channel]);
-    snprintf(full_name, sizeof full_name, "%.900s: %s", from, name);
-    const alb_channel observed = {face, pixels->value, pixels->variance, full_name};
-    if (!alb_observe(&measurement->readings, &observed, error) ||
-        !alb_operator_create(&measurement->forward, &measurement->readings, spot, error))
-        return false;
-    const alb_readings *readings = &measurement->readings;
-    if (readings->core_mm > 0)
+    plane pixels = {0};
+    const char *channel_name = fitting->material.channel_names[channel];
+    alb_measurement *measurement = &fitting->sides[seen->side][channel];
+    alb_readings *readings = &measurement->readings;
+    snprintf(name, sizeof name, "%s %s", alb_side_names[seen->side], channel_name);
+    snprintf(full_name, sizeof full_name, "%.900s: %s", seen->from, name);
+    bool ok = plane_take(&pixels, seen->image, channel_name, seen->factor, seen->saturation, error);
+    const alb_channel observed = {seen->face, pixels.value, pixels.variance, full_name};
+    ok = ok && alb_observe(readings, &observed, error) &&
+         alb_operator_create(&measurement->forward, readings, seen->spots[channel], error);
+    plane_free(&pixels);
+    if (ok && readings->core_mm > 0)
         alb_text_add(notes,
                      "%s: pixels out to %.4g mm of the centre are not measured (saturated); the core is the form's.\n",
                      name, readings->core_mm);
-    return alb_fitting_run(fitting, side, channel, common, error);
+    return ok;
+}
+
+// All channels, each by a thread; notes and the first error in the order of the channels.
+static bool observe_channels(alb_fitting *fitting, const photo *seen, alb_text *notes, alb_error *error)
+{
+    alb_text own_notes[3] = {{0}};
+    alb_error reasons[3] = {{0}};
+    bool ok[3] = {true, true, true}, all = true;
+#pragma omp parallel for schedule(dynamic)
+    for (int c = 0; c < fitting->material.channels; c++)
+        ok[c] = observe_channel(fitting, seen, c, &own_notes[c], &reasons[c]);
+    for (int c = 0; c < 3; c++) {
+        if (all && own_notes[c].bytes)
+            alb_text_add(notes, "%s", own_notes[c].bytes);
+        notes->failed = notes->failed || own_notes[c].failed;
+        if (all && !ok[c])
+            all = alb_fail(error, reasons[c].status, "%s", reasons[c].text);
+        alb_text_free(&own_notes[c]);
+    }
+    return all;
 }
 
 static bool read_product(alb_image *image, alb_provenance *provenance, const alb_calibration *calibration,
@@ -110,15 +141,21 @@ static bool measure_spots(alb_spot spots[3], alb_provenance *provenance, const a
     alb_face face = {0};
     bool ok = read_product(&image, provenance, calibration, white, error) &&
               alb_face_seen(&face, &calibration->views[white->side].camera, error);
-    for (int c = 0; ok && c < calibration->channels; c++) {
+    alb_error reasons[3] = {{0}};
+#pragma omp parallel for schedule(dynamic)
+    for (int c = 0; c < (ok ? calibration->channels : 0); c++) {
         char name[ALB_NAME_SIZE + 16];
         plane pixels = {0};
         snprintf(name, sizeof name, "%s %s", white->shot, calibration->channel_names[c]);
-        ok = plane_take(&pixels, &image, calibration->channel_names[c], 1, INFINITY, error);
-        const alb_channel channel = {&face, pixels.value, pixels.variance, name};
-        ok = ok && alb_spot_measure(&spots[c], &channel, error);
+        if (plane_take(&pixels, &image, calibration->channel_names[c], 1, INFINITY, &reasons[c])) {
+            const alb_channel channel = {&face, pixels.value, pixels.variance, name};
+            alb_spot_measure(&spots[c], &channel, &reasons[c]);
+        }
         plane_free(&pixels);
     }
+    for (int c = 0; c < 3; c++)
+        if (ok && reasons[c].status != ALB_OK)
+            ok = alb_fail(error, reasons[c].status, "%s", reasons[c].text);
     alb_face_free(&face);
     alb_image_free(&image);
     return ok;
@@ -137,8 +174,8 @@ static void note_view(alb_text *notes, const alb_calibration *calibration, alb_s
             alb_side_names[side], angle_deg);
 }
 
-static bool fit_product(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
-                        const alb_calibration *calibration, const alb_product *product, alb_error *error)
+static bool observe_product(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
+                            const alb_calibration *calibration, const alb_product *product, alb_error *error)
 {
     alb_image image = {0};
     alb_face face = {0};
@@ -147,13 +184,13 @@ static bool fit_product(alb_fitting *fitting, alb_provenance *provenance, alb_te
     bool ok = read_product(&image, provenance, calibration, product, error) &&
               alb_face_seen(&face, &calibration->views[product->side].camera, error) &&
               measure_spots(spots, provenance, calibration, &product->pattern, error);
-    for (int c = 0; ok && c < calibration->channels; c++) {
-        plane pixels = {0};
-        const alb_common_sd common = {product->relative_scale_sd[c],
-                                      calibration->views[product->side].relative_length_sd};
-        ok = plane_take(&pixels, &image, calibration->channel_names[c], M_PI, INFINITY, error) &&
-             fit_plane(fitting, product->shot, product->side, c, &face, &pixels, &spots[c], common, notes, error);
-        plane_free(&pixels);
+    if (ok) {
+        const photo seen = {product->shot, product->side, &image, &face, {&spots[0], &spots[1], &spots[2]},
+                            M_PI,          INFINITY};
+        for (int c = 0; c < calibration->channels; c++)
+            fitting->sides[product->side][c].common =
+                (alb_common_sd){product->relative_scale_sd[c], calibration->views[product->side].relative_length_sd};
+        ok = observe_channels(fitting, &seen, notes, error);
     }
     for (int c = 0; c < 3; c++)
         alb_spot_free(&spots[c]);
@@ -163,8 +200,8 @@ static bool fit_product(alb_fitting *fitting, alb_provenance *provenance, alb_te
 }
 
 // Every slab spot of a calibrated session.
-static bool fit_products(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
-                         const alb_calibration *calibration, alb_error *error)
+static bool observe_products(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
+                             const alb_calibration *calibration, alb_error *error)
 {
     bool taken[ALB_SIDES] = {false};
     for (int i = 0; i < calibration->product_count; i++) {
@@ -176,7 +213,7 @@ static bool fit_products(alb_fitting *fitting, alb_provenance *provenance, alb_t
                             "%s: more than one shot of a spot on the slab in %s; a material has one",
                             calibration->folder, alb_side_names[product->side]);
         taken[product->side] = true;
-        if (!fit_product(fitting, provenance, notes, calibration, product, error))
+        if (!observe_product(fitting, provenance, notes, calibration, product, error))
             return false;
     }
     return taken[ALB_REFLECTION] || taken[ALB_TRANSMISSION] ||
@@ -197,7 +234,7 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, 
         material->refractive_index = calibration->refractive_index;
         material->channels = calibration->channels;
         memcpy(material->channel_names, calibration->channel_names, sizeof material->channel_names);
-        ok = fit_products(fitting, provenance, notes, calibration, error);
+        ok = observe_products(fitting, provenance, notes, calibration, error) && alb_fitting_run(fitting, error);
     }
     free(calibration);
     return ok;
@@ -221,8 +258,8 @@ static bool take_channels(alb_material *material, const alb_image *image, const 
     return true;
 }
 
-static bool fit_image(alb_fitting *fitting, alb_text *notes, const char *path, alb_side side, double mm_per_pixel,
-                      const alb_spot *spot, alb_error *error)
+static bool observe_image(alb_fitting *fitting, alb_text *notes, const char *path, alb_side side, double mm_per_pixel,
+                          const alb_spot *spot, alb_error *error)
 {
     alb_image image = {0};
     alb_face face = {0};
@@ -233,12 +270,8 @@ static bool fit_image(alb_fitting *fitting, alb_text *notes, const char *path, a
     if (ok && bits)
         alb_text_add(notes, "%s: %d-bit values are taken as linear; those at full scale as not measured.\n",
                      alb_path_name(path), bits);
-    for (int c = 0; ok && c < fitting->material.channels; c++) {
-        plane pixels = {0};
-        ok = plane_take(&pixels, &image, fitting->material.channel_names[c], 1, saturation, error) &&
-             fit_plane(fitting, path, side, c, &face, &pixels, spot, (alb_common_sd){0, 0}, notes, error);
-        plane_free(&pixels);
-    }
+    const photo seen = {path, side, &image, &face, {spot, spot, spot}, 1, saturation};
+    ok = ok && observe_channels(fitting, &seen, notes, error);
     alb_face_free(&face);
     alb_image_free(&image);
     return ok;
@@ -261,9 +294,9 @@ bool alb_fitting_from_images(alb_fitting *fitting, alb_provenance *provenance, a
     name_after(&fitting->material, paths[ALB_REFLECTION] ? paths[ALB_REFLECTION] : paths[ALB_TRANSMISSION]);
     for (int side = 0; ok && side < ALB_SIDES; side++)
         ok = !paths[side] || (alb_provenance_add(provenance, paths[side], error) &&
-                              fit_image(fitting, notes, paths[side], (alb_side)side, mm_per_pixel, &spot, error));
+                              observe_image(fitting, notes, paths[side], (alb_side)side, mm_per_pixel, &spot, error));
     alb_spot_free(&spot);
-    return ok;
+    return ok && alb_fitting_run(fitting, error);
 }
 
 bool alb_fitting_from_table(alb_fitting *fitting, alb_provenance *provenance, const char *path, alb_side side,
@@ -275,5 +308,5 @@ bool alb_fitting_from_table(alb_fitting *fitting, alb_provenance *provenance, co
     snprintf(fitting->material.channel_names[0], sizeof fitting->material.channel_names[0], "Y");
     return alb_table_read(&measurement->readings, path, error) && alb_provenance_add(provenance, path, error) &&
            alb_operator_identity(&measurement->forward, &measurement->readings, error) &&
-           alb_fitting_run(fitting, side, 0, (alb_common_sd){0, 0}, error);
+           alb_fitting_run(fitting, error);
 }

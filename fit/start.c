@@ -22,15 +22,24 @@ bool alb_basis_create(alb_basis *basis, const alb_readings *readings, const alb_
     *basis = (alb_basis){.count = count};
     basis->decay_per_mm = alb_allocate(2 * (size_t)count, sizeof(double), error);
     basis->readings = alb_allocate(2 * (size_t)count * (size_t)readings->count, sizeof(double), error);
-    double *on_grid = alb_allocate((size_t)forward->grid_count, sizeof(double), error);
-    const bool ok = basis->decay_per_mm && basis->readings && on_grid;
-    for (int j = 0; ok && j < 2 * count; j++) {
+    const size_t rows = (size_t)readings->count, grid = (size_t)forward->grid_count;
+    double(*on_grid)[ALB_OPERATOR_COLUMNS] = alb_allocate(grid, sizeof *on_grid, error);
+    double(*columns)[ALB_OPERATOR_COLUMNS] = alb_allocate(rows, sizeof *columns, error);
+    const bool ok = basis->decay_per_mm && basis->readings && on_grid && columns;
+    for (int j = 0; ok && j < 2 * count; j++)
         basis->decay_per_mm[j] =
             low * pow(high / low, (j % count) / (double)(count - 1)) * (j < count ? 1 : ALB_TIED_RATIO);
-        for (int k = 0; k < forward->grid_count; k++)
-            on_grid[k] = exp(-basis->decay_per_mm[j] * forward->grid_mm[k]);
-        alb_operator_apply(basis->readings + (size_t)j * (size_t)readings->count, forward, on_grid);
+    for (int j = 0; ok && j < 2 * count; j += ALB_OPERATOR_COLUMNS) {
+        const int together = 2 * count - j < ALB_OPERATOR_COLUMNS ? 2 * count - j : ALB_OPERATOR_COLUMNS;
+        for (size_t k = 0; k < grid; k++)
+            for (int c = 0; c < together; c++)
+                on_grid[k][c] = exp(-basis->decay_per_mm[j + c] * forward->grid_mm[k]);
+        alb_operator_apply(columns, forward, (const double(*)[ALB_OPERATOR_COLUMNS])on_grid);
+        for (int c = 0; c < together; c++)
+            for (size_t i = 0; i < rows; i++)
+                basis->readings[(size_t)(j + c) * rows + i] = columns[i][c];
     }
+    free(columns);
     free(on_grid);
     if (!ok)
         alb_basis_free(basis);

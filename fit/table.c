@@ -39,6 +39,8 @@ static bool read_number(double *out, cursor *c, bool last, alb_error *error)
     *out = strtod(c->at, &end);
     if (end != c->at + length || !isfinite(*out))
         return bad(error, c, "a finite number is wanted");
+    if (fabs(*out) > 1e60 || (*out != 0 && fabs(*out) < 1e-60))
+        return bad(error, c, "a number from 1e-60 to 1e60 is wanted: beyond, squares are lost");
     c->at = end;
     if (last ? *c->at == ',' : *c->at != ',') {
         c->column++;
@@ -51,12 +53,17 @@ static bool read_number(double *out, cursor *c, bool last, alb_error *error)
     return true;
 }
 
-static void end_line(cursor *c)
+// A line ends with LF or CR LF, the last one also with the file.
+static bool end_line(cursor *c, alb_error *error)
 {
     c->at += *c->at == '\r';
+    if (*c->at && *c->at != '\n')
+        return alb_fail(error, ALB_BAD_DATA, "%s:%d: the line ends in CR alone; LF or CR LF is wanted", c->name,
+                        c->line);
     c->at += *c->at == '\n';
     c->line++;
     c->column = 1;
+    return true;
 }
 
 static bool read_header(bool *with_sd, cursor *c, alb_error *error)
@@ -68,8 +75,7 @@ static bool read_header(bool *with_sd, cursor *c, alb_error *error)
         return alb_fail(error, ALB_BAD_DATA, "%s:1: the header should be '%s' or '%s', found '%.*s'", c->name, plain,
                         with, (int)(length < 60 ? length : 60), c->at);
     c->at += length;
-    end_line(c);
-    return true;
+    return end_line(c, error);
 }
 
 static int count_lines(const char *text)
@@ -97,7 +103,8 @@ static bool read_rows(alb_readings *readings, cursor *c, bool with_sd, alb_error
             return false;
         if (with_sd && !(readings->sd[i] > 0))
             return bad(error, &at, "the sd must be positive");
-        end_line(c);
+        if (!end_line(c, error))
+            return false;
     }
     return true;
 }

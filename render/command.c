@@ -27,6 +27,23 @@ static bool png_path(char path[ALB_PATH_SIZE], const outputs *out, alb_error *er
     return true;
 }
 
+// Minutes of work should not end at a path that cannot be written, nor one output replace another or the scene.
+static bool check_targets(const outputs *out, alb_error *error)
+{
+    char png[ALB_PATH_SIZE];
+    if (!png_path(png, out, error))
+        return false;
+    const char *const paths[] = {out->scene, out->picture, png, out->mesh};
+    for (int i = 1; i < 4 && paths[i]; i++) {
+        for (int k = 0; k < i; k++)
+            if (!strcmp(paths[i], paths[k]))
+                return alb_fail(error, ALB_USAGE, "%s is given for two files; give each its own", paths[i]);
+        if (!alb_file_check_target(paths[i], error))
+            return false;
+    }
+    return true;
+}
+
 static int by_size(const void *a, const void *b)
 {
     const float x = *(const float *)a, y = *(const float *)b;
@@ -199,7 +216,7 @@ static bool run(int argc, char **argv, alb_error *error)
     alb_scene scene = {0};
     alb_provenance provenance = {.command = "render"};
     if (!alb_options_read(options, sizeof options / sizeof *options, argc, argv, error) ||
-        !alb_scene_read(&scene, &provenance, out.scene, error))
+        !check_targets(&out, error) || !alb_scene_read(&scene, &provenance, out.scene, error))
         return false;
     snprintf(provenance.options, sizeof provenance.options, "rays_per_patch %d, residual %g, seed %llu",
              scene.rays_per_patch, scene.residual, (unsigned long long)scene.seed);

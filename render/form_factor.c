@@ -14,6 +14,8 @@
 #include "base/random.h"
 #include <stdlib.h>
 
+enum { HITS_MAX = 1 << 29 };
+
 static double fraction(double x) { return x - floor(x); }
 
 static alb_vector direction_of(const alb_form_factors *factors, alb_vector normal, size_t patch, int q)
@@ -55,6 +57,11 @@ bool alb_form_factors_create(alb_form_factors *factors, const alb_patches *patch
 {
     const size_t n = patches->count;
     *factors = (alb_form_factors){.patch_count = n, .rays = rays, .seed = seed, .sampling = sampling};
+    if (n > HITS_MAX / (size_t)rays)
+        return alb_fail(error, ALB_BAD_DATA,
+                        "%zu patches with %d rays each need %.1f GiB, more than the 2 GiB that form factors may take; "
+                        "use a coarser mesh or fewer rays_per_patch",
+                        n, rays, (double)n * rays * sizeof *factors->hits / 0x1p30);
     if (!(factors->hits = alb_allocate(n * (size_t)rays, sizeof *factors->hits, error)))
         return false;
 #pragma omp parallel for schedule(dynamic, 64)

@@ -118,6 +118,10 @@ static bool beam_create(beam *out, const alb_light *light, const alb_patches *pa
         out->pixels[out->pixel_count][0] = x * light->pixel_mm;
         out->pixels[out->pixel_count++][1] = y * light->pixel_mm;
     }
+    if (!out->pixel_count)
+        return alb_fail(error, ALB_BAD_DATA,
+                        "a projector's disc of %g pixels across holds the centre of none; 1, or 1.42 and more",
+                        light->diameter_px);
     out->side = (int)ceil(sqrt((double)RAYS / (double)out->pixel_count));
     return true;
 }

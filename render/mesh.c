@@ -265,14 +265,15 @@ done:
 
 bool alb_mesh_subdivide(alb_mesh *mesh, double longest_mm, alb_error *error)
 {
-    double area = 0;
+    double least = 0; // triangles that come of it: by area, or for slivers by length
     for (size_t i = 0; i < mesh->face_count; i++) {
         const alb_vector a = mesh->vertices[mesh->faces[i][0]];
-        const alb_vector normal =
-            alb_cross(alb_sub(mesh->vertices[mesh->faces[i][1]], a), alb_sub(mesh->vertices[mesh->faces[i][2]], a));
-        area += 0.5 * alb_length(normal);
+        const alb_vector ab = alb_sub(mesh->vertices[mesh->faces[i][1]], a);
+        const alb_vector ac = alb_sub(mesh->vertices[mesh->faces[i][2]], a);
+        const double length = fmax(alb_length(ab), fmax(alb_length(ac), alb_length(alb_sub(ac, ab))));
+        least += fmax(0.5 * alb_length(alb_cross(ab, ac)) / (longest_mm * longest_mm), length / longest_mm);
     }
-    if (area / (longest_mm * longest_mm) > ALB_FACES_MAX / 4)
+    if (least > ALB_FACES_MAX / 4)
         return alb_fail(error, ALB_BAD_DATA, "edges of %g mm would make more than %d triangles; choose longer ones",
                         longest_mm, ALB_FACES_MAX / 4);
     for (size_t halved = 1; halved;)

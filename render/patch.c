@@ -25,7 +25,10 @@ bool alb_patches_create(alb_patches *patches, const alb_mesh *mesh, alb_error *e
         patches->centroids[i] = alb_times(1.0 / 3, alb_add(a, alb_add(b, c)));
         patches->normals[i] = alb_unit(cross);
         patches->areas_mm2[i] = 0.5 * alb_length(cross);
-        largest = fmax(largest, fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z))));
+        for (int k = 0; k < 3; k++) {
+            const alb_vector at = corner(mesh, i, k);
+            largest = fmax(largest, fmax(fabs(at.x), fmax(fabs(at.y), fabs(at.z))));
+        }
     }
     patches->offset_mm = 32 * 0x1p-24 * largest;
     return true;

@@ -203,19 +203,15 @@ bool alb_radiosity_check(double *largest, const alb_scatter *scatter, bool close
 {
     static const char *const channels[3] = {"R", "G", "B"};
     const size_t n = scatter->patch_count;
-    rgb *ones = alb_allocate(n, sizeof *ones, error), *sums = alb_allocate(n, sizeof *sums, error);
-    bool ok = ones && sums;
+    const rgb *sums = (const rgb *)scatter->row_sums;
+    bool ok = true;
     size_t patch = 0;
     int channel = 0;
-    for (size_t i = 0; ok && i < n; i++)
-        ones[i][0] = ones[i][1] = ones[i][2] = 1;
-    if (ok)
-        alb_scatter_apply(sums, scatter, (const rgb *)ones);
-    for (size_t i = 0; ok && i < n; i++)
+    for (size_t i = 0; i < n; i++)
         for (int c = 0; c < 3; c++)
             if (!(sums[i][c] <= sums[patch][channel]))
                 patch = i, channel = c;
-    if (ok && n) {
+    if (n) {
         const double sum = sums[patch][channel], rounding = 1e-6; // weights are floats
         if (largest)
             *largest = sum;
@@ -227,7 +223,5 @@ bool alb_radiosity_check(double *largest, const alb_scatter *scatter, bool close
                 surfaces[materials[patch]].name, patch, channels[channel], sum,
                 closed_scene ? "a closed scene needs less than 1" : "at most 1");
     }
-    free(ones);
-    free(sums);
     return ok;
 }

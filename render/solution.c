@@ -45,12 +45,11 @@ static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *
 static bool take_balance(alb_solution *s, alb_error *error)
 {
     const size_t n = s->patches.count, rays = (size_t)s->factors.rays;
-    double(*gathered)[3] = alb_allocate(n, sizeof *gathered, error), (*kept)[3] = alb_allocate(n, sizeof *kept, error);
-    const bool ok = gathered && kept;
-    if (ok) {
+    double(*gathered)[3] = alb_allocate(n, sizeof *gathered, error);
+    const double(*kept)[3] = (const double(*)[3])s->scatter.column_sums;
+    const bool ok = gathered != NULL;
+    if (ok)
         alb_form_factors_apply(gathered, &s->factors, (const double(*)[3])s->radiosity);
-        alb_scatter_column_sums(kept, &s->scatter, &s->patches);
-    }
     for (size_t p = 0; ok && p < n; p++) {
         size_t sky = 0, back = 0;
         for (size_t q = 0; q < rays; q++) {
@@ -67,7 +66,6 @@ static bool take_balance(alb_solution *s, alb_error *error)
         }
     }
     free(gathered);
-    free(kept);
     return ok;
 }
 
