@@ -9,7 +9,7 @@
 #include "base/camera.h"
 #include "capture/session.h"
 
-enum { ALB_FLAT_TERMS = 5 };
+enum { ALB_FLAT_TERMS = 15 };
 
 typedef struct alb_estimate {
     double value, sd;

@@ -1,20 +1,28 @@
-// Vignetting as an even polynomial about the middle of the picture with a slope, least squares over all pixels:
-//   D = c (1 + f0 q + f1 q^2 + f2 q^3 + f3 x + f4 y),   q = x^2 + y^2, (x, y) from the middle in half diagonals
-// The slope takes up a diffuser that is brighter on one side, and a lens whose axis is off the middle.
-// Stops being true for dust, and where the axis lies far off the middle.
+// Vignetting as a polynomial of the picture, least squares over all pixels:
+//   D = c (1 + sum of f_ij x^i y^j over 1 <= i + j <= 4 + f (x^2 + y^2)^3),   (x, y) from the middle in half diagonals
+// All terms to the fourth order hold an axis off the middle and a diffuser that is brighter on one side; the last one
+// is the next of a centred lens. Stops being true for dust and for edges of the lens barrel within the picture.
 #include "calibrate/flat.h"
 #include <math.h>
 #include <string.h>
 
 enum { TERMS = ALB_FLAT_TERMS + 1 };
 
-// 1, q, q^2, q^3, x, y
+// 1, then x^i y^j by order, then the sixth power of the distance.
 static void basis_at(double basis[TERMS], const alb_lens *lens, double u, double v)
 {
     const double half = 0.5 * hypot(lens->width, lens->height);
     const double x = (u - 0.5 * (lens->width - 1)) / half, y = (v - 0.5 * (lens->height - 1)) / half;
-    const double q = x * x + y * y, values[TERMS] = {1, q, q * q, q * q * q, x, y};
-    memcpy(basis, values, sizeof values);
+    int k = 0;
+    for (int order = 0; order <= 4; order++)
+        for (int j = 0; j <= order; j++) {
+            double term = 1;
+            for (int i = 0; i < order; i++)
+                term *= i < j ? y : x;
+            basis[k++] = term;
+        }
+    const double q = x * x + y * y;
+    basis[k] = q * q * q;
 }
 
 double alb_flat_value(const double flat[ALB_FLAT_TERMS], const alb_lens *lens, double u, double v)
