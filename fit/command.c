@@ -58,12 +58,15 @@ static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
 {
     const alb_outcome *outcome = &fitting->sides[side][c].outcome;
     const alb_fitted *fitted = &outcome->fitted;
-    printf("%-12s %-2s %-20s total %.5g +- %.2g", alb_side_names[side], fitting->material.channel_names[c],
-           alb_form_name(fitted->profile.form), fitted->total, fitted->total_sd);
+    printf("%-12s %-2s %-19s total %.5g +- %.2g  chi-square %.4g / %d  rms %.2f %%%s\n", alb_side_names[side],
+           fitting->material.channel_names[c], alb_form_name(fitted->profile.form), fitted->total, fitted->total_sd,
+           fitted->chi_square, fitted->degrees_of_freedom, 100 * outcome->rms_relative,
+           fitted->identifiable ? "" : "  NOT DECIDED");
+    printf("%16s", "");
     for (int p = 0; p < alb_form_parameter_count(fitted->profile.form); p++)
-        printf("  %c%d %.4g +- %.2g", p % 2 ? 'b' : 'a', p / 2 + 1, fitted->profile.parameters[p], fitted->sd[p]);
-    printf("  chi-square %.4g / %d, rms %.2f %%%s\n", fitted->chi_square, fitted->degrees_of_freedom,
-           100 * outcome->rms_relative, fitted->identifiable ? "" : "  NOT DECIDED");
+        printf("%c%d %.4g +- %.2g  ", p % 2 ? 'b' : 'a', p / 2 + 1, fitted->profile.parameters[p], fitted->sd[p]);
+    printf("\n%16sd ln S / dr %.5g +- %.2g per mm from %.4g to %.4g mm\n", "", outcome->slope_per_mm, outcome->slope_sd,
+           outcome->slope_from_mm, outcome->slope_to_mm);
 }
 
 static void note_border(const alb_fitting *fitting, alb_side side, alb_text *notes)
