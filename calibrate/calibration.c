@@ -79,7 +79,7 @@ bool alb_calibration_write(const alb_calibration *c, const alb_provenance *prove
     write_estimates(&json, "gain_dn_per_electron", c, c->gain_dn_per_electron);
     alb_json_list(&json, "flat");
     for (int i = 0; i < c->channels; i++)
-        alb_json_numbers(&json, NULL, c->flat[i], 3);
+        alb_json_numbers(&json, NULL, c->flat[i], ALB_FLAT_TERMS);
     alb_json_end_list(&json);
     alb_lens_write(&json, &c->views[ALB_REFLECTION].camera.lens, c->lens_sd, c->lens_rms_px);
     alb_json_object(&json, "views");
@@ -249,7 +249,7 @@ static bool read_all(alb_calibration *c, alb_node root, alb_error *error)
     if (count != (size_t)c->channels)
         return alb_node_fail(error, root, "flat", "expected a row for each channel, found %zu", count);
     for (size_t i = 0; i < count; i++)
-        if (!alb_node_item_numbers(c->flat[i], 3, list, i, -1e3, 1e3, error))
+        if (!alb_node_item_numbers(c->flat[i], ALB_FLAT_TERMS, list, i, -1e3, 1e3, error))
             return false;
     if (!alb_node_list(&list, &count, root, "products", error))
         return false;

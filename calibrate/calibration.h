@@ -9,6 +9,8 @@
 #include "base/camera.h"
 #include "capture/session.h"
 
+enum { ALB_FLAT_TERMS = 15 };
+
 typedef struct alb_estimate {
     double value, sd;
 } alb_estimate;
@@ -38,9 +40,8 @@ typedef struct alb_calibration {
     char channel_names[3][8];
     alb_estimate black_dn[3], read_noise_dn[3], gain_dn_per_electron[3];
     double white_level_dn;
-    double flat[3][3]; // vignetting: 1 + f0 q + f1 q^2 + f2 q^3, q = squared distance from the principal point over the
-                       // squared half diagonal
-    double lens_sd[9]; // of fx, fy, cx, cy, k1, k2, p1, p2, k3
+    double flat[3][ALB_FLAT_TERMS]; // vignetting, see flat.c
+    double lens_sd[9];              // of fx, fy, cx, cy, k1, k2, p1, p2, k3
     double lens_rms_px;
     alb_view views[ALB_SIDES];
     alb_product products[ALB_SHOTS_MAX];

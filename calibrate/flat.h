@@ -3,8 +3,8 @@
 #include "base/image.h"
 #include "calibrate/calibration.h"
 
-// Fits 1 + f0 q + f1 q^2 + f2 q^3 per channel to the merged diffuser; *rms (relative) is the worst channel's residual.
-bool alb_flat_fit(double flat[3][3], double *rms, const alb_image *merged, const alb_lens *lens, int channels,
-                  alb_error *error);
-// The factor by which a pixel is darker than the principal point.
-double alb_flat_value(const double flat[3], const alb_lens *lens, double u, double v);
+// Fits the polynomial of flat.c per channel to the merged diffuser; *rms (relative) is the worst channel's residual.
+bool alb_flat_fit(double flat[3][ALB_FLAT_TERMS], double *rms, const alb_image *merged, const alb_lens *lens,
+                  int channels, alb_error *error);
+// The factor by which a pixel is darker than the middle of the picture.
+double alb_flat_value(const double flat[ALB_FLAT_TERMS], const alb_lens *lens, double u, double v);

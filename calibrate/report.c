@@ -18,7 +18,7 @@ static void add_vignetting(alb_page *page, const alb_calibration *c)
     for (int i = 0; i < c->channels; i++) {
         for (int k = 0; k < SAMPLES; k++) {
             x[k] = 0.5 * hypot(lens->width, lens->height) * k / (SAMPLES - 1);
-            y[i][k] = alb_flat_value(c->flat[i], lens, lens->cx + x[k], lens->cy);
+            y[i][k] = alb_flat_value(c->flat[i], lens, 0.5 * lens->width + x[k], 0.5 * lens->height);
         }
         curves[i] = (alb_curve){.label = c->channel_names[i],
                                 .colour = colours[c->channels == 3 ? i : 2],
@@ -27,7 +27,7 @@ static void add_vignetting(alb_page *page, const alb_calibration *c)
                                 .count = SAMPLES};
     }
     const alb_panel panel = {.title = "Vignetting",
-                             .x_label = "distance from the principal point, px",
+                             .x_label = "distance from the middle of the picture, px",
                              .y_label = "relative response",
                              .curves = curves,
                              .curve_count = (size_t)c->channels,

@@ -24,7 +24,7 @@ void alb_board_views_free(alb_board_views *views);
 // Looks for the board in one photograph (any channels: their mean) and adds it to the views.
 bool alb_board_look(alb_board_views *views, const alb_image *photograph, const char *name, const alb_board *board,
                     alb_error *error);
-// The lens from all views found, at least 3, with as many coefficients of distortion as lower AIC; *terms says how
+// The lens from all views found, at least 3, with as many coefficients of distortion as lower BIC; *terms says how
 // many. ALB_BAD_DATA says how many views were found.
 bool alb_board_lens(alb_lens_estimate *estimate, int *terms, alb_board_views *views, const alb_board *board, int width,
                     int height, alb_error *error);
@@ -32,6 +32,7 @@ bool alb_board_lens(alb_lens_estimate *estimate, int *terms, alb_board_views *vi
 bool alb_board_pose(alb_transform *camera_from_world, double *rms_px, const alb_board_views *views, int view,
                     const alb_board *board, const alb_lens *lens, alb_error *error);
 // Relative standard deviation of lengths on the face of view `view`: what the lens does to them, by leaving out one
-// view after the other (jackknife), and what the noise of the board's own corners does.
+// view after the other (jackknife), what the noise of the board's own corners does, and a bias of 0.01 px of all of
+// them.
 bool alb_board_length_sd(double *relative_sd, const alb_board_views *views, int view, const alb_board *board,
                          const alb_lens *lens, int terms, alb_error *error);

@@ -1,20 +1,19 @@
 // Which form, and what is known of it.
 //
-// 1. Each form is fitted by the noise alone, the simplest first: one exponential, the tied signed pair (search.h), two
-//    exponentials, the signed pair: 2, 3, 4, 4 parameters. A richer one is taken where it lowers chi-square by more
-//    than max(10.6, 2 ln n) for two parameters or max(7.88, ln n) for one: a likelihood-ratio test at 1 % shared by two
-//    candidates (0.5 % each), or BIC, whichever asks more. Between equally rich forms the smaller chi-square decides.
-// 2. A form stands where P(chi-square) >= 1e-3. Then its parameters, covariance and total are those of this fit, and
-//    nothing else enters.
-// 3. Where no form stands, the form is an approximation and its errors are not those of the noise. Each reading then
-// gets a
-//    relative discrepancy t in quadrature, sd_i^2 + (t f_i)^2, with t such that chi-square equals its degrees of
-//    freedom (this inflates the covariance), and the energy that the image itself shows, sum value * area, becomes one
-//    more reading with the small sd the noise gives it: the fitted form conserves the measured energy, whatever it does
-//    between. Without that, two exponentials lose 8 % of the energy of a real reflection. Half of the share beyond the
-//    readings is added to the sd of the total. The form of least
-//    sum ln(sd_i^2 + t^2 f_i^2) + k ln n is taken, among those whose parameters the data decide where there is one.
-// 4. The sd of what all readings share enters last: of the flux, over amplitudes and total; of the unit of length, over
+// 1. The forms of up to two terms are fitted by the noise alone, the simplest first: one exponential, the tied signed
+//    pair (search.h), two exponentials, the signed pair: 2, 3, 4, 4 parameters. A richer one is taken where it lowers
+//    chi-square by more than max(10.6, 2 ln n) for two parameters or max(7.88, ln n) for one: a likelihood-ratio test
+//    at 1 % shared by two candidates (0.5 % each), or BIC, whichever asks more. Between equally rich forms the smaller
+//    chi-square decides.
+// 2. A form stands where P(chi-square) >= 1e-3; where the one taken does not, the simplest that does is taken. Its
+//    parameters, covariance and total are those of this fit, and nothing else enters.
+// 3. Where none of them stands, three exponentials (6 parameters) are fitted, and taken where they stand and the noise
+//    decides their parameters. So data made by two terms see a third in one case of 1000 at most.
+// 4. Where no form stands, the form is an approximation and its errors are not those of the noise (discrepancy.c). The
+//    form of least score is taken, among those whose parameters the data decide where there is one; three exponentials
+//    only where they are decided and their score is less than that of the simpler form.
+//    Half of the share beyond the readings is added to the sd of the total.
+// 5. The sd of what all readings share enters last: of the flux, over amplitudes and total; of the unit of length, over
 //    amplitudes (twice) and decays.
 //
 // The data do not decide where J^T J is singular, a parameter is uncertain by more than half of itself, a decay is
@@ -22,34 +21,34 @@
 #include "fit/choose.h"
 #include "base/memory.h"
 #include "base/statistics.h"
-#include "fit/search.h"
+#include "fit/discrepancy.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double reject_tail = 1e-3, tied_gain_wanted = 7.88, gain_wanted = 10.6, relative_sd_limit = 0.5,
-                    measured_share_wanted = 0.5;
+static const double reject_tail = 1e-3, tied_gain_wanted = 7.88, gain_wanted = 10.6, measured_share_wanted = 0.5;
 // simplest first
 static const alb_candidate candidates[ALB_ATTEMPTS_MAX] = {{ALB_FORM_EXPONENTIAL, false},
                                                            {ALB_FORM_SIGNED_EXPONENTIALS, true},
                                                            {ALB_FORM_TWO_EXPONENTIALS, false},
-                                                           {ALB_FORM_SIGNED_EXPONENTIALS, false}};
-enum { ONE, TIED };
+                                                           {ALB_FORM_SIGNED_EXPONENTIALS, false},
+                                                           {ALB_FORM_THREE_EXPONENTIALS, false}};
+enum { ONE, TIED, TWO, SIGNED, THREE };
 
 typedef struct fit {
     alb_profile profile;
     bool found;
     double chi_square;
-    double discrepancy, score;
 } fit;
 
-static bool fit_by_noise(fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, const alb_basis *basis,
+// Fits the candidates `from` to `to`.
+static bool fit_by_noise(fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, int from, int to, const alb_basis *basis,
                          const alb_weighing *noise, alb_error *error)
 {
     const int n = noise->readings->count;
-    outcome->attempt_count = ALB_ATTEMPTS_MAX;
-    for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
+    outcome->attempt_count = to + 1;
+    for (int f = from; f <= to; f++) {
         alb_attempt *attempt = &outcome->attempts[f];
         const int parameters = alb_candidate_parameters(candidates[f]);
         *attempt = (alb_attempt){candidates[f].form, candidates[f].tied, (double)NAN, (double)NAN, n - parameters, ""};
@@ -69,9 +68,14 @@ static bool fit_by_noise(fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, const
     return true;
 }
 
+static bool stands(const alb_attempt *attempt)
+{
+    return alb_chi_square_tail(attempt->chi_square, attempt->degrees_of_freedom) >= reject_tail; // NaN: not found
+}
+
 static void explain(const fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, int chosen)
 {
-    for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
+    for (int f = 0; f < outcome->attempt_count; f++) {
         alb_attempt *attempt = &outcome->attempts[f];
         if (f == chosen || !fits[f].found)
             continue;
@@ -88,140 +92,89 @@ static void explain(const fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, int 
     }
 }
 
-// Index of the form to take by the noise, -1 where none was found; *stands whether the noise lets it stand.
-static int simplest(bool *stands, const fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, int n)
+// Index of the form of up to two terms to take by the noise, -1 where none stands.
+static int simplest(const fit fits[ALB_ATTEMPTS_MAX], const alb_outcome *outcome, int n)
 {
-    int rich = -1;
-    for (int f = TIED + 1; f < ALB_ATTEMPTS_MAX; f++)
-        if (fits[f].found && (rich < 0 || fits[f].chi_square < fits[rich].chi_square))
-            rich = f;
     const double one = fits[ONE].found ? fits[ONE].chi_square : (double)INFINITY;
     const double tied = fits[TIED].found ? fits[TIED].chi_square : (double)INFINITY;
-    const double both = rich >= 0 ? fits[rich].chi_square : (double)INFINITY;
+    const double two = fits[TWO].found ? fits[TWO].chi_square : (double)INFINITY;
+    const double pair = fits[SIGNED].found ? fits[SIGNED].chi_square : (double)INFINITY;
+    const double both = fmin(two, pair);
     const double step = fmax(tied_gain_wanted, log(n)), steps = fmax(gain_wanted, 2 * log(n));
-    int chosen = fits[ONE].found ? ONE : -1;
+    int chosen = ONE;
     if (tied < one - step && !(both < tied - step))
         chosen = TIED;
-    else if (rich >= 0 && both < one - steps)
-        chosen = rich;
-    *stands = chosen >= 0 &&
-              alb_chi_square_tail(fits[chosen].chi_square, outcome->attempts[chosen].degrees_of_freedom) >= reject_tail;
-    if (*stands)
-        explain(fits, outcome, chosen);
-    return chosen;
+    else if (both < one - steps)
+        chosen = two <= pair ? TWO : SIGNED;
+    if (stands(&outcome->attempts[chosen]))
+        return chosen;
+    for (int f = ONE; f <= SIGNED; f++)
+        if (stands(&outcome->attempts[f]))
+            return f;
+    return -1;
 }
 
-// The t of sum residual^2 / (sd^2 + t^2 fitted^2) = freedom, by bisection in ln t; 0 where the noise suffices.
-static double discrepancy_of(const alb_readings *readings, const double *fitted, int freedom)
+// *chosen is the index of the form to take by the noise, -1 where none stands.
+static bool choose_by_noise(int *chosen, fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, const alb_basis *basis,
+                            const alb_weighing *noise, alb_error *error)
 {
-    double low = 1e-9, high = 1e3;
-    for (int iteration = 0; iteration < 60; iteration++) {
-        const double middle = sqrt(low * high);
-        double sum = 0;
-        for (int i = 0; i < readings->count; i++) {
-            const double residual = readings->value[i] - fitted[i], extra = middle * fitted[i];
-            sum += residual * residual / (readings->sd[i] * readings->sd[i] + extra * extra);
-        }
-        if (sum > freedom)
-            low = middle;
-        else
-            high = middle;
-    }
-    return high;
-}
-
-static void widen(double *sd, const alb_readings *readings, const double *fitted, double discrepancy)
-{
-    for (int i = 0; i < readings->count; i++)
-        sd[i] = hypot(readings->sd[i], discrepancy * fitted[i]);
-}
-
-// One form with its discrepancy and with the energy; sd has room for the readings and holds the widened ones at the
-// end.
-static bool fit_with_discrepancy(fit *out, double *sd, alb_candidate candidate, const alb_basis *basis,
-                                 const alb_weighing *noise, double energy_sd, alb_error *error)
-{
-    const alb_readings *readings = noise->readings;
-    const alb_weighing widened = {readings, noise->forward, sd, energy_sd};
-    const int parameters = alb_candidate_parameters(candidate);
-    widen(sd, readings, readings->value, 0.1);
-    if (!alb_search(&out->profile, &out->chi_square, &out->found, candidate, basis, &widened, error))
+    double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX];
+    bool full_rank;
+    int which;
+    if (!fit_by_noise(fits, outcome, ONE, SIGNED, basis, noise, error))
         return false;
-    for (int iteration = 0; out->found && iteration < 12; iteration++) {
-        double *fitted = alb_operator_readings(noise->forward, &out->profile, error);
-        if (!fitted)
+    *chosen = simplest(fits, outcome, noise->readings->count);
+    if (*chosen < 0) {
+        if (!fit_by_noise(fits, outcome, THREE, THREE, basis, noise, error))
             return false;
-        const double before = out->discrepancy;
-        out->discrepancy = discrepancy_of(readings, fitted, readings->count - parameters);
-        widen(sd, readings, fitted, out->discrepancy);
-        free(fitted);
-        if (!alb_search_polish(&out->profile, &out->chi_square, candidate, &widened, error))
-            return false;
-        if (fabs(out->discrepancy - before) < 1e-4 * before)
-            break;
+        if (stands(&outcome->attempts[THREE])) {
+            if (!alb_search_covariance(covariance, &full_rank, &fits[THREE].profile, candidates[THREE], noise, error))
+                return false;
+            *chosen = alb_parameters_decided(&which, &fits[THREE].profile, full_rank, covariance) ? THREE : -1;
+        }
     }
-    out->score = parameters * log(readings->count);
-    for (int i = 0; i < readings->count; i++)
-        out->score += 2 * log(sd[i]);
+    if (*chosen >= 0)
+        explain(fits, outcome, *chosen);
     return true;
 }
 
-// Whether the readings decide every parameter: full rank, and each known to better than half of itself; *which is the
-// first that is not, -1 where the rank is deficient.
-static bool decided(int *which, const alb_profile *profile, bool full_rank,
-                    double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX])
+static bool better(int f, const alb_discrepancy_fit *one, const alb_discrepancy_fit *best)
 {
-    *which = -1;
-    for (int p = 0; full_rank && p < alb_form_parameter_count(profile->form); p++)
-        if (!(sqrt(covariance[p][p]) <= relative_sd_limit * fabs(profile->parameters[p]))) {
-            *which = p;
-            return false;
-        }
-    return full_rank;
+    if (f == THREE)
+        return one->decided && one->score < best->score;
+    return one->decided == best->decided ? one->score < best->score : one->decided;
 }
 
+// *chosen is the index of the form to take where none stands; sd has room for the readings and holds the widened ones
+// at the end.
 static bool choose_with_discrepancy(int *chosen, fit fits[ALB_ATTEMPTS_MAX], double *sd, alb_outcome *outcome,
                                     const alb_basis *basis, const alb_weighing *noise, double energy_sd,
                                     alb_error *error)
 {
-    bool sure[ALB_ATTEMPTS_MAX] = {false};
-    int best = -1, which;
+    alb_discrepancy_fit misfits[ALB_ATTEMPTS_MAX] = {{.found = false}};
+    int best = -1;
     for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
-        fits[f] = (fit){.found = false};
-        if (noise->readings->count < alb_candidate_parameters(candidates[f]) + 1)
-            continue;
-        const alb_weighing widened = {noise->readings, noise->forward, sd, energy_sd};
-        double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX];
-        bool full_rank;
-        if (!fit_with_discrepancy(&fits[f], sd, candidates[f], basis, noise, energy_sd, error))
+        char *why = outcome->attempts[f].rejected;
+        if (f == THREE && stands(&outcome->attempts[f]))
+            snprintf(why, ALB_REASON_SIZE, "fits within the noise, but its parameters are not decided");
+        else if (noise->readings->count > alb_candidate_parameters(candidates[f]) &&
+                 !alb_discrepancy_search(&misfits[f], sd, candidates[f], basis, noise, energy_sd, error))
             return false;
-        if (!fits[f].found)
+        if (!misfits[f].found)
             continue;
-        if (!alb_search_covariance(covariance, &full_rank, &fits[f].profile, candidates[f], &widened, error))
-            return false;
-        sure[f] = decided(&which, &fits[f].profile, full_rank, covariance);
-        if (best < 0 || sure[f] > sure[best] || (sure[f] == sure[best] && fits[f].score < fits[best].score))
+        snprintf(why, ALB_REASON_SIZE, "no form fits within the noise; this one misses by %.3g relative%s",
+                 misfits[f].relative, misfits[f].decided ? "" : " and its parameters are not decided");
+        if (best < 0 || better(f, &misfits[f], &misfits[best]))
             best = f;
     }
     if (best < 0)
         return alb_fail(error, ALB_UNDECIDED,
                         "no sum of exponentials follows the readings: they do not fall with distance");
-    for (int f = 0; f < ALB_ATTEMPTS_MAX; f++) {
-        char *why = outcome->attempts[f].rejected;
-        if (f != best && fits[f].found)
-            snprintf(why, ALB_REASON_SIZE, "no form fits within the noise; this one misses by %.3g relative%s",
-                     fits[f].discrepancy, sure[f] ? "" : " and its parameters are not decided");
-        else if (f == best)
-            *why = '\0';
-    }
-    // the widened sd of the best one are wanted, not those of the last
-    double *fitted = alb_operator_readings(noise->forward, &fits[best].profile, error);
-    if (!fitted)
-        return false;
-    widen(sd, noise->readings, fitted, fits[best].discrepancy);
-    free(fitted);
+    outcome->attempts[best].rejected[0] = '\0';
+    outcome->discrepancy_relative = misfits[best].relative;
+    fits[best].profile = misfits[best].profile;
     *chosen = best;
-    return true;
+    return alb_discrepancy_widen(sd, &misfits[best], noise, error);
 }
 
 static double quadratic_form(const double *gradient, const alb_fitted *fitted, int n)
@@ -260,7 +213,7 @@ static void judge(alb_outcome *outcome, const alb_readings *readings, bool full_
     } else if (!(outcome->measured_share >= measured_share_wanted)) {
         snprintf(why, ALB_REASON_SIZE, "%.0f %% of the total lies where nothing was measured (readings end at %.4g mm)",
                  100 * (1 - outcome->measured_share), readings->outer_mm);
-    } else if (!decided(&which, profile, full_rank, outcome->fitted.covariance)) {
+    } else if (!alb_parameters_decided(&which, profile, full_rank, outcome->fitted.covariance)) {
         snprintf(why, ALB_REASON_SIZE, "%s = %.4g +- %.2g: uncertain by more than half of itself",
                  alb_form_parameter_name(profile->form, which), profile->parameters[which], fitted->sd[which]);
     } else if (profile->parameters[1] * readings->outer_mm < 0.1) {
@@ -327,7 +280,7 @@ static bool complete(alb_outcome *outcome, alb_candidate candidate, const alb_re
 bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward, alb_common_sd common,
                 alb_error *error)
 {
-    bool ok = false, stands;
+    bool ok = false;
     int chosen;
     alb_basis basis = {0};
     fit fits[ALB_ATTEMPTS_MAX] = {{.found = false}};
@@ -343,14 +296,12 @@ bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_op
         energy_variance += pow(readings->area_mm2[i] * readings->sd[i], 2);
     const double energy_sd = hypot(sqrt(energy_variance), 1e-4 * fabs(alb_energy(readings, readings->value)));
     alb_weighing weighing = {readings, forward, sd, 0};
-    if (!fit_by_noise(fits, outcome, &basis, &weighing, error))
+    if (!choose_by_noise(&chosen, fits, outcome, &basis, &weighing, error))
         goto done;
-    chosen = simplest(&stands, fits, outcome, readings->count);
-    if (!stands) {
+    if (chosen < 0) {
         const alb_weighing noise = {readings, forward, readings->sd, 0};
         if (!choose_with_discrepancy(&chosen, fits, sd, outcome, &basis, &noise, energy_sd, error))
             goto done;
-        outcome->discrepancy_relative = fits[chosen].discrepancy;
         weighing.energy_sd = energy_sd;
     }
     outcome->fitted.profile = fits[chosen].profile;

@@ -2,7 +2,7 @@
 #pragma once
 #include "fit/operator.h"
 
-enum { ALB_ATTEMPTS_MAX = 4, ALB_REASON_SIZE = 320 };
+enum { ALB_ATTEMPTS_MAX = 5, ALB_REASON_SIZE = 320 };
 
 typedef struct alb_attempt {
     alb_form form;
@@ -16,7 +16,7 @@ typedef struct alb_outcome {
     alb_fitted fitted;
     bool tied; // three free parameters: the covariance is of rank 3
     alb_attempt attempts[ALB_ATTEMPTS_MAX];
-    int attempt_count;
+    int attempt_count;           // three exponentials are tried only where nothing simpler stands
     double discrepancy_relative; // 0: the form fits within the noise
     double rms_relative;         // (measured - fitted) / fitted over the readings above 3 sd
     double measured_share;       // share of the total within the readings

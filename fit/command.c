@@ -13,7 +13,7 @@ static const char usage[] =
     "       alabaster fit --table PROFILE.csv --side reflection|transmission -o DIR [--json]\n"
     "\n"
     "Fits per channel and side the profile S(r), radiant exitance per incident flux, 1/mm^2, with the simplest of one\n"
-    "exponential, two, or two with one negative amplitude that the noise does not reject.\n"
+    "exponential, two, two with one negative amplitude, or three that the noise does not reject.\n"
     "Writes DIR/material.json and DIR/report/fit.html, fit.svg, fit.csv. DIR is SESSION where it is not given.\n"
     "\n"
     "Images are looked at square on and hold radiant exitance per incident flux in 1/mm^2; in another unit the "
@@ -66,10 +66,25 @@ static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
            100 * outcome->rms_relative, fitted->identifiable ? "" : "  NOT DECIDED");
 }
 
+static void note_border(const alb_fitting *fitting, alb_side side, alb_text *notes)
+{
+    double complete_mm = INFINITY;
+    for (int c = 0; c < fitting->material.channels; c++) {
+        const alb_readings *readings = &fitting->sides[side][c].readings;
+        if (fitting->sides[side][c].measured && readings->outer_mm > readings->complete_mm)
+            complete_mm = fmin(complete_mm, readings->complete_mm);
+    }
+    if (isfinite(complete_mm))
+        alb_text_add(notes, "%s: rings beyond %.4g mm are cut by the border of the image.\n", alb_side_names[side],
+                     complete_mm);
+}
+
 // What a reader should know; *failure is filled with the first reason not to trust the result.
 static void examine(alb_fitting *fitting, bool absolute, alb_text *notes, alb_error *failure)
 {
     const alb_material *material = &fitting->material;
+    for (int side = 0; side < ALB_SIDES; side++)
+        note_border(fitting, (alb_side)side, notes);
     for (int c = 0; c < material->channels; c++) {
         double total = 0, variance = 0;
         for (int side = 0; side < ALB_SIDES; side++) {
@@ -80,12 +95,12 @@ static void examine(alb_fitting *fitting, bool absolute, alb_text *notes, alb_er
             total += outcome->fitted.total;
             variance += outcome->fitted.total_sd * outcome->fitted.total_sd;
             if (outcome->discrepancy_relative > 0)
-                alb_text_add(
-                    notes,
-                    "%s %s: no form fits within the noise. %s misses by %.2g %% relative, which is in the sd; the "
-                    "measured energy is kept.\n",
-                    alb_side_names[side], material->channel_names[c], alb_form_name(outcome->fitted.profile.form),
-                    100 * outcome->discrepancy_relative);
+                alb_text_add(notes,
+                             "%s %s: no decided form fits within the noise. %s misses by %.2g %% relative, which is in "
+                             "the sd; the "
+                             "measured energy is kept.\n",
+                             alb_side_names[side], material->channel_names[c],
+                             alb_form_name(outcome->fitted.profile.form), 100 * outcome->discrepancy_relative);
             if (!outcome->fitted.identifiable)
                 alb_fail(failure, ALB_UNDECIDED, "%s %s: the data do not decide: %s; the best guess is written",
                          alb_side_names[side], material->channel_names[c], outcome->undecided);

@@ -81,7 +81,7 @@ static void put_outcome(alb_json *json, const char *side, const alb_outcome *out
     alb_json_integer(json, "degrees_of_freedom", fitted->degrees_of_freedom);
     alb_json_string(json, "errors_from",
                     outcome->discrepancy_relative > 0
-                        ? "no form fits within the noise: relative discrepancy in quadrature with "
+                        ? "no decided form fits within the noise: relative discrepancy in quadrature with "
                           "the noise, measured energy kept as a reading of its own"
                         : "the noise alone");
     alb_json_number(json, "discrepancy_relative", outcome->discrepancy_relative);
@@ -137,11 +137,13 @@ static bool check_profile(const alb_profile *profile, alb_node node, alb_error *
         good &= p[2] >= 0 && p[3] > 0;
     if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS)
         good &= p[2] <= 0 && p[0] + p[2] >= -1e-12 * p[0] && p[3] > p[1];
+    if (profile->form == ALB_FORM_THREE_EXPONENTIALS)
+        good &= p[2] > 0 && p[3] > p[1] && p[4] > 0 && p[5] > p[3];
     if (profile->form == ALB_FORM_DIPOLE)
         good = p[0] > 0 && p[1] > 0 && p[2] >= 1 && p[2] <= 3;
-    return good ||
-           alb_node_fail(error, node, "parameters", "not a positive profile that falls off: %s (%g, %g, %g, %g)",
-                         alb_form_name(profile->form), p[0], p[1], p[2], p[3]);
+    return good || alb_node_fail(error, node, "parameters",
+                                 "not a positive profile that falls off: %s (%g, %g, %g, %g, %g, %g)",
+                                 alb_form_name(profile->form), p[0], p[1], p[2], p[3], p[4], p[5]);
 }
 
 static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)

@@ -11,11 +11,12 @@ typedef enum alb_form {
     ALB_FORM_EXPONENTIAL,         // a1 e^(-b1 r)
     ALB_FORM_TWO_EXPONENTIALS,    // a1 e^(-b1 r) + a2 e^(-b2 r), a > 0 (Sheng et al. 2014, sec. 6)
     ALB_FORM_SIGNED_EXPONENTIALS, // the same with b1 < b2, a2 < 0, a1 + a2 >= 0: S >= 0 everywhere
+    ALB_FORM_THREE_EXPONENTIALS,  // three terms, a > 0, b1 < b2 < b3
     ALB_FORM_DIPOLE,              // classic dipole of a half-space (Jensen et al. 2001)
     ALB_FORMS
 } alb_form;
 
-// Parameters of the exponential forms: a1, b1, a2, b2 (amplitude_per_mm2, decay_per_mm).
+// Parameters of the exponential forms: a1, b1, a2, b2, a3, b3 (amplitude_1_per_mm2, decay_1_per_mm, ...).
 // Of the dipole: absorption_per_mm, reduced_scattering_per_mm, refractive_index.
 typedef struct alb_profile {
     alb_form form;

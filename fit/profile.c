@@ -2,7 +2,7 @@
 //
 // Sums of exponentials (Sheng et al. 2014, "Translucent Radiosity", sec. 6): S(r) = sum_j a_j e^(-b_j r)
 //   integral_0^rho S r dr = sum_j a_j (1 - (1 + b_j rho) e^(-b_j rho)) / b_j^2,  total = 2 pi sum_j a_j / b_j^2.
-//   Two positive terms are log-convex with a cusp at r = 0. With one negative amplitude, b1 < b2 and a1 + a2 >= 0, S
+//   Positive terms are log-convex with a cusp at r = 0. With one negative amplitude, b1 < b2 and a1 + a2 >= 0, S
 //   stays positive (the negative term starts lower and dies first) and can be flat at r = 0, as transmission is.
 //
 // Classic dipole of a half-space (Jensen et al. 2001, eq. 4): alpha' = s'/(a + s'), l = 1/(a + s'), sigma = sqrt(3 a (a
@@ -32,6 +32,11 @@ static const struct {
                                       2,
                                       {"amplitude_1_per_mm2", "decay_1_per_mm", "amplitude_2_per_mm2",
                                        "decay_2_per_mm"}},
+    [ALB_FORM_THREE_EXPONENTIALS] = {"three_exponentials",
+                                     6,
+                                     3,
+                                     {"amplitude_1_per_mm2", "decay_1_per_mm", "amplitude_2_per_mm2", "decay_2_per_mm",
+                                      "amplitude_3_per_mm2", "decay_3_per_mm"}},
     [ALB_FORM_DIPOLE] = {"dipole", 3, 0, {"absorption_per_mm", "reduced_scattering_per_mm", "refractive_index"}},
 };
 

@@ -102,8 +102,9 @@ static void put_attempts(alb_page *page, const alb_fitting *fitting, alb_side si
 static void put_tables(alb_page *page, const alb_fitting *fitting, const char *notes)
 {
     alb_page_heading(page, "Profiles");
-    alb_page_table(page, "side|channel|form|a1, b1, a2, b2 (1/mm², 1/mm)|total|sd|chi-square / dof|rms %|measured %|"
-                         "not decided because");
+    alb_page_table(page,
+                   "side|channel|form|a1, b1, a2, b2, a3, b3 (1/mm², 1/mm)|total|sd|chi-square / dof|rms %|measured %|"
+                   "not decided because");
     for (int side = 0; side < ALB_SIDES; side++)
         for (int c = 0; c < fitting->material.channels; c++)
             if (fitting->sides[side][c].measured)

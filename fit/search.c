@@ -1,21 +1,21 @@
 // Weighted least squares of a form to the readings: min sum ((v_i - (W S)_i) / sd_i)^2.
 //
-// Start: for every pair of decays on a logarithmic grid the amplitudes are a linear problem of two unknowns with the
-// signs the form wants (variable projection; Golub & Pereyra 1973); its Gram matrix is made once. The best few pairs
-// are polished by Levenberg-Marquardt (Ceres) in parameters that cannot break the form:
-//   positive: ln a1, ln b1, ln a2, ln b2        signed: ln a1, ln b1, s = -a2/a1 in 0..1, ln(b2/b1 - 1), b2/b1 >= 1.1
-// Logarithms and whitening make the answer independent of the units. b1 < b2 in both.
+// The best places of a grid (start.c) are polished by Levenberg-Marquardt (Ceres) in parameters that cannot break the
+// form:
+//   positive: ln a_j, ln b_j        signed: ln a1, ln b1, s = -a2/a1 in 0..1, ln(b2/b1 - 1), b2/b1 >= 1.1
+// Logarithms and whitening make the answer independent of the units. b1 < b2 < b3 in all.
 // Covariance: (J^T J)^-1 in the form's own parameters, J whitened, scaled to unit diagonal before it is inverted. It is
 // the linear approximation: too small where the decays come close (b2/b1 below about 1.5 at 1 % noise).
 #include "fit/search.h"
 #include "base/memory.h"
 #include "fit/solve.h"
+#include "fit/start.h"
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { STARTS = 5, PARAMETERS = 4 };
+enum { PARAMETERS = ALB_PARAMETERS_MAX };
 
 int alb_candidate_parameters(alb_candidate candidate)
 {
@@ -30,63 +30,33 @@ double alb_energy(const alb_readings *readings, const double *value)
     return sum;
 }
 
-bool alb_basis_create(alb_basis *basis, const alb_readings *readings, const alb_operator *forward, alb_error *error)
-{
-    double nearest = readings->outer_mm;
-    for (int i = 0; i < readings->count; i++)
-        if (readings->r_mm[i] > 0)
-            nearest = fmin(nearest, readings->r_mm[i]);
-    const double low = 0.1 / readings->outer_mm, high = fmin(10 / nearest, 1e6 * low);
-    const int count = (int)fmax(ceil(4 * log(high / low)), 24);
-    *basis = (alb_basis){.count = count};
-    basis->decay_per_mm = alb_allocate(2 * (size_t)count, sizeof(double), error);
-    basis->readings = alb_allocate(2 * (size_t)count * (size_t)readings->count, sizeof(double), error);
-    const size_t rows = (size_t)readings->count, grid = (size_t)forward->grid_count;
-    double(*on_grid)[ALB_OPERATOR_COLUMNS] = alb_allocate(grid, sizeof *on_grid, error);
-    double(*columns)[ALB_OPERATOR_COLUMNS] = alb_allocate(rows, sizeof *columns, error);
-    const bool ok = basis->decay_per_mm && basis->readings && on_grid && columns;
-    for (int j = 0; ok && j < 2 * count; j++)
-        basis->decay_per_mm[j] =
-            low * pow(high / low, (j % count) / (double)(count - 1)) * (j < count ? 1 : ALB_TIED_RATIO);
-    for (int j = 0; ok && j < 2 * count; j += ALB_OPERATOR_COLUMNS) {
-        const int together = 2 * count - j < ALB_OPERATOR_COLUMNS ? 2 * count - j : ALB_OPERATOR_COLUMNS;
-        for (size_t k = 0; k < grid; k++)
-            for (int c = 0; c < together; c++)
-                on_grid[k][c] = exp(-basis->decay_per_mm[j + c] * forward->grid_mm[k]);
-        alb_operator_apply(columns, forward, (const double(*)[ALB_OPERATOR_COLUMNS])on_grid);
-        for (int c = 0; c < together; c++)
-            for (size_t i = 0; i < rows; i++)
-                basis->readings[(size_t)(j + c) * rows + i] = columns[i][c];
-    }
-    free(columns);
-    free(on_grid);
-    if (!ok)
-        alb_basis_free(basis);
-    return ok;
-}
+int alb_weighing_rows(const alb_weighing *weighing) { return weighing->readings->count + (weighing->energy_sd > 0); }
 
-void alb_basis_free(alb_basis *basis)
+double alb_weighing_reading(const alb_weighing *weighing, int i)
 {
-    free(basis->decay_per_mm);
-    free(basis->readings);
-    *basis = (alb_basis){0};
+    return i < weighing->readings->count
+               ? weighing->readings->value[i] / weighing->sd[i]
+               : alb_energy(weighing->readings, weighing->readings->value) / weighing->energy_sd;
 }
 
 // Whitened model and its derivatives by the form's own parameters: values[0] the model, values[1 + p] the derivatives.
-// All come from the readings of e^(-b r) and r e^(-b r) of the one or two terms: the operator's four columns.
+// All come from the readings of e^(-b r) and r e^(-b r) of the terms: two columns of the operator each, one application
+// for two terms, a second for the third.
+enum { BLOCKS = (PARAMETERS + ALB_OPERATOR_COLUMNS - 1) / ALB_OPERATOR_COLUMNS };
+
 typedef struct model {
     const alb_weighing *weighing;
     alb_candidate candidate;
     bool known; // the values are those of `at`
     double at[PARAMETERS];
-    double (*on_grid)[ALB_OPERATOR_COLUMNS], (*columns)[ALB_OPERATOR_COLUMNS];
+    double (*on_grid)[ALB_OPERATOR_COLUMNS], (*columns[BLOCKS])[ALB_OPERATOR_COLUMNS];
     double *values[1 + PARAMETERS];
 } model;
 
 static void model_free(model *m)
 {
     free(m->on_grid);
-    free(m->columns);
+    free(m->columns[0]);
     free(m->values[0]);
     *m = (model){0};
 }
@@ -96,40 +66,47 @@ static bool model_create(model *out, alb_candidate candidate, const alb_weighing
     const size_t grid = (size_t)weighing->forward->grid_count, rows = (size_t)weighing->readings->count + 1;
     *out = (model){.weighing = weighing, .candidate = candidate};
     if (!(out->on_grid = alb_allocate(grid, sizeof *out->on_grid, error)) ||
-        !(out->columns = alb_allocate(rows, sizeof *out->columns, error)) ||
+        !(out->columns[0] = alb_allocate(BLOCKS * rows, sizeof *out->columns[0], error)) ||
         !(out->values[0] = alb_allocate((1 + PARAMETERS) * rows, sizeof(double), error))) {
         model_free(out);
         return false;
     }
+    for (int block = 1; block < BLOCKS; block++)
+        out->columns[block] = out->columns[block - 1] + rows;
     for (int p = 1; p <= PARAMETERS; p++)
         out->values[p] = out->values[p - 1] + rows;
     return true;
 }
 
-static int residual_count(const alb_weighing *weighing)
+// Readings of e^(-b r) and r e^(-b r) of the terms from parameter `from` on, as many as go together.
+static void apply_terms(model *m, const double *p, int from, int parameters)
 {
-    return weighing->readings->count + (weighing->energy_sd > 0);
+    const alb_operator *forward = m->weighing->forward;
+    const int together = parameters - from < ALB_OPERATOR_COLUMNS ? parameters - from : ALB_OPERATOR_COLUMNS;
+    for (int k = 0; k < forward->grid_count; k++)
+        for (int t = 0; t < together; t += 2) {
+            const double e = exp(-p[from + t + 1] * forward->grid_mm[k]);
+            m->on_grid[k][t] = e;
+            m->on_grid[k][t + 1] = forward->grid_mm[k] * e;
+        }
+    alb_operator_apply(m->columns[from / ALB_OPERATOR_COLUMNS], forward,
+                       (const double(*)[ALB_OPERATOR_COLUMNS])m->on_grid);
 }
 
 static void model_evaluate(model *m, const alb_profile *profile)
 {
-    const alb_operator *forward = m->weighing->forward;
     const alb_readings *readings = m->weighing->readings;
     const int n = readings->count, parameters = alb_form_parameter_count(profile->form);
     const double *p = profile->parameters;
-    for (int k = 0; k < forward->grid_count; k++)
-        for (int t = 0; t < parameters; t += 2) {
-            const double e = exp(-p[t + 1] * forward->grid_mm[k]);
-            m->on_grid[k][t] = e;
-            m->on_grid[k][t + 1] = forward->grid_mm[k] * e;
-        }
-    alb_operator_apply(m->columns, forward, (const double(*)[ALB_OPERATOR_COLUMNS])m->on_grid);
+    for (int from = 0; from < parameters; from += ALB_OPERATOR_COLUMNS)
+        apply_terms(m, p, from, parameters);
     for (int i = 0; i < n; i++) {
         m->values[0][i] = 0;
         for (int t = 0; t < parameters; t += 2) {
-            m->values[0][i] += p[t] * m->columns[i][t];
-            m->values[1 + t][i] = m->columns[i][t];
-            m->values[2 + t][i] = -p[t] * m->columns[i][t + 1];
+            const double *column = m->columns[t / ALB_OPERATOR_COLUMNS][i] + t % ALB_OPERATOR_COLUMNS;
+            m->values[0][i] += p[t] * column[0];
+            m->values[1 + t][i] = column[0];
+            m->values[2 + t][i] = -p[t] * column[1];
         }
     }
     for (int q = 0; q <= parameters; q++) {
@@ -140,25 +117,16 @@ static void model_evaluate(model *m, const alb_profile *profile)
     }
 }
 
-static double whitened_reading(const alb_weighing *weighing, int i)
-{
-    return i < weighing->readings->count
-               ? weighing->readings->value[i] / weighing->sd[i]
-               : alb_energy(weighing->readings, weighing->readings->value) / weighing->energy_sd;
-}
-
 // The form's parameters from the solver's, and the derivatives d form[i] / d solver[j].
 static alb_profile profile_of(double jacobian[PARAMETERS][PARAMETERS], alb_candidate candidate, const double *u)
 {
     alb_profile profile = {.form = candidate.form};
     double *p = profile.parameters, (*j)[PARAMETERS] = jacobian;
     memset(jacobian, 0, sizeof(double[PARAMETERS][PARAMETERS]));
-    p[0] = j[0][0] = exp(u[0]);
-    p[1] = j[1][1] = exp(u[1]);
-    if (candidate.form == ALB_FORM_TWO_EXPONENTIALS) {
-        p[2] = j[2][2] = exp(u[2]);
-        p[3] = j[3][3] = exp(u[3]);
-    } else if (candidate.form == ALB_FORM_SIGNED_EXPONENTIALS) {
+    const bool positive = candidate.form != ALB_FORM_SIGNED_EXPONENTIALS;
+    for (int i = 0; i < (positive ? alb_form_parameter_count(candidate.form) : 2); i++)
+        p[i] = j[i][i] = exp(u[i]);
+    if (!positive) {
         const double excess = candidate.tied ? ALB_TIED_RATIO - 1 : exp(u[3]); // of b2 over b1
         p[2] = j[2][0] = -u[2] * p[0];
         j[2][2] = -p[0];
@@ -171,10 +139,13 @@ static alb_profile profile_of(double jacobian[PARAMETERS][PARAMETERS], alb_candi
 static void solver_of(double *u, const alb_profile *profile)
 {
     const double *p = profile->parameters;
-    u[0] = log(p[0]);
-    u[1] = log(p[1]);
-    u[2] = profile->form == ALB_FORM_TWO_EXPONENTIALS ? log(p[2]) : -p[2] / p[0];
-    u[3] = profile->form == ALB_FORM_TWO_EXPONENTIALS ? log(p[3]) : log(p[3] / p[1] - 1);
+    const bool positive = profile->form != ALB_FORM_SIGNED_EXPONENTIALS;
+    for (int i = 0; i < (positive ? alb_form_parameter_count(profile->form) : 2); i++)
+        u[i] = log(p[i]);
+    if (!positive) {
+        u[2] = -p[2] / p[0];
+        u[3] = log(p[3] / p[1] - 1);
+    }
 }
 
 static void evaluate(double *residuals, double *jacobian, const double *u, const void *context)
@@ -182,7 +153,7 @@ static void evaluate(double *residuals, double *jacobian, const double *u, const
     model *m = (model *)context;
     double chain[PARAMETERS][PARAMETERS];
     const alb_profile profile = profile_of(chain, m->candidate, u);
-    const int all = alb_form_parameter_count(m->candidate.form), rows = residual_count(m->weighing);
+    const int all = alb_form_parameter_count(m->candidate.form), rows = alb_weighing_rows(m->weighing);
     const int free_parameters = alb_candidate_parameters(m->candidate);
     const size_t size = (size_t)free_parameters * sizeof *u;
     if (!m->known ||
@@ -191,7 +162,7 @@ static void evaluate(double *residuals, double *jacobian, const double *u, const
     m->known = true;
     memcpy(m->at, u, size);
     for (int i = 0; i < rows; i++) {
-        residuals[i] = m->values[0][i] - whitened_reading(m->weighing, i);
+        residuals[i] = m->values[0][i] - alb_weighing_reading(m->weighing, i);
         for (int q = 0; jacobian && q < free_parameters; q++) {
             double sum = 0;
             for (int p = 0; p < all; p++)
@@ -204,10 +175,15 @@ static void evaluate(double *residuals, double *jacobian, const double *u, const
 static void order_terms(alb_profile *profile)
 {
     double *p = profile->parameters;
-    if (profile->form != ALB_FORM_TWO_EXPONENTIALS || p[1] <= p[3])
-        return;
-    const double a = p[0], b = p[1];
-    p[0] = p[2], p[1] = p[3], p[2] = a, p[3] = b;
+    const int terms = alb_form_term_count(profile->form);
+    if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS)
+        return; // in order by its bounds
+    for (int i = 1; i < terms; i++)
+        for (int j = i; j > 0 && p[2 * j + 1] < p[2 * j - 1]; j--) {
+            const double a = p[2 * j], b = p[2 * j + 1];
+            p[2 * j] = p[2 * j - 2], p[2 * j + 1] = p[2 * j - 1];
+            p[2 * j - 2] = a, p[2 * j - 1] = b;
+        }
 }
 
 bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate candidate, const alb_weighing *weighing,
@@ -233,7 +209,7 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate c
     const int parameters = alb_candidate_parameters(candidate);
     for (int p = 0; p < parameters; p++)
         u[p] = fmin(fmax(u[p], lower[p]), upper[p]);
-    const alb_problem problem = {parameters, residual_count(weighing), evaluate, &m, lower, upper};
+    const alb_problem problem = {parameters, alb_weighing_rows(weighing), evaluate, &m, lower, upper};
     const bool ok = alb_solve(u, chi_square, &problem, error);
     *profile = profile_of(chain, candidate, u);
     order_terms(profile);
@@ -241,111 +217,22 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate c
     return ok;
 }
 
-typedef struct start {
-    double gain; // how much it lowers chi-square from that of nothing
-    int i, j;    // decays
-    double a1, a2;
-} start;
-
-// Amplitudes of two columns with the signs of the form; false where they do not come out so.
-static bool amplitudes(start *out, alb_form form, double g11, double g12, double g22, double h1, double h2)
-{
-    const double determinant = g11 * g22 - g12 * g12;
-    if (form == ALB_FORM_EXPONENTIAL) {
-        out->a1 = g11 > 0 ? h1 / g11 : 0;
-        out->gain = out->a1 * h1;
-        return out->a1 > 0;
-    }
-    if (!(determinant > 1e-12 * g11 * g22))
-        return false;
-    out->a1 = (g22 * h1 - g12 * h2) / determinant;
-    out->a2 = (g11 * h2 - g12 * h1) / determinant;
-    if (form == ALB_FORM_SIGNED_EXPONENTIALS && out->a1 + out->a2 < 0) {
-        const double difference = g11 - 2 * g12 + g22;
-        out->a1 = (h1 - h2) / difference;
-        out->a2 = -out->a1;
-    }
-    out->gain = out->a1 * h1 + out->a2 * h2;
-    return out->a1 > 0 && (form == ALB_FORM_TWO_EXPONENTIALS ? out->a2 > 0 : out->a2 < 0);
-}
-
-// Keeps the best few that are not neighbours of a better one.
-static void keep(start *best, int *count, start candidate)
-{
-    for (int k = 0; k < *count; k++)
-        if (abs(best[k].i - candidate.i) <= 1 && abs(best[k].j - candidate.j) <= 1) {
-            if (candidate.gain > best[k].gain)
-                best[k] = candidate;
-            return;
-        }
-    if (*count < STARTS) {
-        best[(*count)++] = candidate;
-        return;
-    }
-    int worst = 0;
-    for (int k = 1; k < STARTS; k++)
-        if (best[k].gain < best[worst].gain)
-            worst = k;
-    if (candidate.gain > best[worst].gain)
-        best[worst] = candidate;
-}
-
-static double whitened_basis(const alb_basis *basis, const alb_weighing *weighing, int j, int i)
-{
-    const int n = weighing->readings->count;
-    const double *column = basis->readings + (size_t)j * (size_t)n;
-    return i < n ? column[i] / weighing->sd[i] : alb_energy(weighing->readings, column) / weighing->energy_sd;
-}
-
-static bool find_starts(start *best, int *count, alb_candidate candidate, const alb_basis *basis,
-                        const alb_weighing *weighing, alb_error *error)
-{
-    const int rows = residual_count(weighing), m = basis->count, all = 2 * m;
-    double *columns = alb_allocate((size_t)all * (size_t)rows, sizeof(double), error);
-    double *right = alb_allocate((size_t)all, sizeof(double), error);
-    *count = 0;
-    if (!columns || !right) {
-        free(columns);
-        free(right);
-        return false;
-    }
-    for (int j = 0; j < all; j++)
-        for (int i = 0; i < rows; i++) {
-            columns[j * rows + i] = whitened_basis(basis, weighing, j, i);
-            right[j] += columns[j * rows + i] * whitened_reading(weighing, i);
-        }
-    for (int i = 0; i < m; i++)
-        for (int j = i; j < all; j++) {
-            const bool single = candidate.form == ALB_FORM_EXPONENTIAL;
-            if (candidate.tied ? j != i + m : j >= m || single != (i == j))
-                continue;
-            double g11 = 0, g12 = 0, g22 = 0;
-            for (int k = 0; k < rows; k++) {
-                const double x = columns[i * rows + k], y = columns[j * rows + k];
-                g11 += x * x, g12 += x * y, g22 += y * y;
-            }
-            start pair = {.i = i, .j = j};
-            if (amplitudes(&pair, candidate.form, g11, g12, g22, right[i], right[j]))
-                keep(best, count, pair);
-        }
-    free(columns);
-    free(right);
-    return true;
-}
-
 bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_candidate candidate, const alb_basis *basis,
                 const alb_weighing *weighing, alb_error *error)
 {
-    start best[STARTS];
+    alb_start best[ALB_STARTS_MAX];
     int count;
     *found = false;
     *chi_square = INFINITY;
-    if (!find_starts(best, &count, candidate, basis, weighing, error))
+    if (!alb_starts_find(best, &count, candidate, basis, weighing, error))
         return false;
     for (int k = 0; k < count; k++) {
-        alb_profile tried = {candidate.form,
-                             {best[k].a1, basis->decay_per_mm[best[k].i], best[k].a2, basis->decay_per_mm[best[k].j]}};
+        alb_profile tried = {.form = candidate.form};
         double reached;
+        for (int j = 0; j < alb_form_term_count(candidate.form); j++) {
+            tried.parameters[2 * j] = best[k].amplitude[j];
+            tried.parameters[2 * j + 1] = basis->decay_per_mm[best[k].column[j]];
+        }
         if (!alb_search_polish(&tried, &reached, candidate, weighing, error))
             return false;
         if (reached < *chi_square) {
@@ -396,7 +283,7 @@ bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_
         return false;
     model_evaluate(&m, profile);
     const int all = alb_form_parameter_count(profile->form), n = alb_candidate_parameters(candidate);
-    const int rows = residual_count(weighing);
+    const int rows = alb_weighing_rows(weighing);
     // own[p][q]: derivative of the form's parameter p by the free parameter q (a1, b1, a2, and b2 where it is free)
     double own[PARAMETERS][PARAMETERS] = {{0}}, matrix[PARAMETERS][PARAMETERS] = {{0}}, scale[PARAMETERS] = {0};
     for (int p = 0; p < all; p++)

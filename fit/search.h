@@ -11,6 +11,10 @@ typedef struct alb_weighing {
     double energy_sd; // of sum value * area; 0: the energy is not a reading of its own
 } alb_weighing;
 
+// Whitened readings, the energy behind them where it has an sd: how many, and which they are.
+int alb_weighing_rows(const alb_weighing *weighing);
+double alb_weighing_reading(const alb_weighing *weighing, int i);
+
 // A form as it is fitted. Tied: signed exponentials with b2 = ALB_TIED_RATIO b1, three parameters. As b2 comes close to
 // b1 the pair tends to (A + B r) e^(-b r) and its amplitudes grow without bound while S stays: the tied pair stands for
 // all of those, which no data can tell apart, and says what the transmission of a thick slab looks like in three
@@ -32,7 +36,7 @@ typedef struct alb_basis {
 bool alb_basis_create(alb_basis *basis, const alb_readings *readings, const alb_operator *forward, alb_error *error);
 void alb_basis_free(alb_basis *basis);
 
-// *found false where no second term of the wanted sign lowers chi-square (the form collapses to one exponential).
+// *found false where no term of the wanted sign lowers chi-square (the form collapses to a simpler one).
 // *chi_square is over the readings and, where it has an sd, the energy.
 bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_candidate candidate, const alb_basis *basis,
                 const alb_weighing *weighing, alb_error *error);

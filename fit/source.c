@@ -81,9 +81,6 @@ static bool observe_channel(alb_fitting *fitting, const photo *seen, int channel
         alb_text_add(notes,
                      "%s: pixels out to %.4g mm of the centre are not measured (saturated); the core is the form's.\n",
                      name, readings->core_mm);
-    if (ok && readings->outer_mm > readings->complete_mm)
-        alb_text_add(notes, "%s: rings beyond %.4g mm are cut by the border of the image.\n", name,
-                     readings->complete_mm);
     return ok;
 }
 

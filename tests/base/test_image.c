@@ -32,7 +32,7 @@ static void exr_round_trip_is_exact(void **state)
 }
 
 // Noise does not compress: some block comes out exactly as long as it went in, which OpenEXRCore 3.1 alone writes
-// wrongly (5 of these 400 images).
+// wrongly, in a few of these images.
 static void noise_survives(void **state)
 {
     (void)state;

@@ -6,13 +6,13 @@
 
 static const alb_lens lens = {320, 240, 400, 400, 163, 117, 0, 0, 0, 0, 0};
 
-// cos^4 is not a polynomial of the squared distance; three coefficients follow it to 1e-4 over this field.
+// cos^4 about a point off the middle is none of the polynomials; they follow it to 1e-3 over this field.
 static void cosine_vignetting(void **state)
 {
     (void)state;
     alb_error error = {0};
     alb_image image;
-    double flat[3][3], rms;
+    double flat[3][ALB_FLAT_TERMS], rms;
     check_ok(alb_image_create(&image, 320, 240, "R,G,B,variance.R,variance.G,variance.B", &error), &error);
     for (int y = 0; y < 240; y++)
         for (int x = 0; x < 320; x++)
@@ -25,7 +25,7 @@ static void cosine_vignetting(void **state)
     check_ok(alb_flat_fit(flat, &rms, &image, &lens, 3, &error), &error);
     check_near(rms, 0.01, 0.0002); // the noise that was put in
     for (int x = 0; x < 320; x += 20)
-        check_near(alb_flat_value(flat[1], &lens, x, 30),
+        check_near(alb_flat_value(flat[1], &lens, x, 30) / alb_flat_value(flat[1], &lens, lens.cx, lens.cy),
                    pow(1 / (1 + (pow(x - lens.cx, 2) + pow(30 - lens.cy, 2)) / (400 * 400)), 2), 1e-3);
     for (int i = 0; i < 320 * 240 * 6; i++)
         image.pixels[i] = NAN;

@@ -56,8 +56,9 @@ static void round_trip(void **state)
     (void)state;
     static const alb_profile truths[] = {{ALB_FORM_EXPONENTIAL, {0.02, 0.7}},
                                          {ALB_FORM_TWO_EXPONENTIALS, {0.02, 0.7, 0.05, 3}},
-                                         {ALB_FORM_SIGNED_EXPONENTIALS, {0.04, 0.6, -0.03, 1.1}}};
-    for (int i = 0; i < 3; i++) {
+                                         {ALB_FORM_SIGNED_EXPONENTIALS, {0.04, 0.6, -0.03, 1.1}},
+                                         {ALB_FORM_THREE_EXPONENTIALS, {0.02, 0.5, 0.1, 2, 0.8, 8}}};
+    for (size_t i = 0; i < sizeof truths / sizeof truths[0]; i++) {
         alb_error error = {0};
         alb_fitting *fitting = calloc(1, sizeof *fitting);
         alb_material material;
@@ -99,6 +100,22 @@ static void check_replaced(const char *from, const char *to, const char *part)
     free(bytes);
 }
 
+// Three terms out of order, or with one that is not positive, are refused.
+static void damaged_three(void **state)
+{
+    (void)state;
+    const alb_profile truth = {ALB_FORM_THREE_EXPONENTIALS, {0.02, 0.5, 0.1, 2, 0.8, 8}};
+    alb_fitting *fitting = calloc(1, sizeof *fitting);
+    write_table(&truth);
+    fit_and_write(fitting, ALB_REFLECTION);
+    check_replaced("\"amplitude_3_per_mm2\": {\"value\": ", "\"amplitude_3_per_mm2\": {\"value\": -",
+                   "not a positive profile");
+    check_replaced("\"decay_2_per_mm\": {\"value\": ", "\"decay_2_per_mm\": {\"value\": 9", "not a positive profile");
+    check_replaced("three_exponentials", "two_exponentials", "unknown key");
+    alb_fitting_free(fitting);
+    free(fitting);
+}
+
 static void damaged(void **state)
 {
     (void)state;
@@ -106,7 +123,7 @@ static void damaged(void **state)
     alb_fitting *fitting = calloc(1, sizeof *fitting);
     write_table(&truth);
     fit_and_write(fitting, ALB_REFLECTION);
-    check_replaced("two_exponentials", "three_exponentials", "unknown form");
+    check_replaced("two_exponentials", "four_exponentials", "unknown form");
     check_replaced("\"decay_1_per_mm\"", "\"decay_1_per_cm\"", "decay_1_per_mm");
     check_replaced("\"decay_1_per_mm\": {\"value\": ", "\"decay_1_per_mm\": {\"value\": -", "not a positive profile");
     check_replaced("\"total\": {\"value\": ", "\"total\": {\"value\": 1", "does not belong to the parameters");
@@ -141,6 +158,6 @@ static void same_bytes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(round_trip), cmocka_unit_test(damaged),
-                                       cmocka_unit_test(same_bytes)};
+                                       cmocka_unit_test(damaged_three), cmocka_unit_test(same_bytes)};
     return cmocka_run_group_tests(tests, in_own_folder, leave);
 }

@@ -20,6 +20,10 @@ static alb_profile random_profile(alb_form form, alb_random *random)
         p[2] = -p[0] * alb_random_uniform(random);
     if (form == ALB_FORM_EXPONENTIAL)
         p[2] = p[3] = 0;
+    if (form == ALB_FORM_THREE_EXPONENTIALS) {
+        p[4] = p[0] * between(random, 1e-3, 1e3);
+        p[5] = p[3] * between(random, 1.01, 20);
+    }
     if (form == ALB_FORM_DIPOLE) {
         p[0] = between(random, 1e-3, 1);
         p[1] = between(random, 0.1, 10);
@@ -71,7 +75,7 @@ static void discs_and_totals(void **state)
 static void gradients(void **state)
 {
     (void)state;
-    for (int form = ALB_FORM_EXPONENTIAL; form <= ALB_FORM_SIGNED_EXPONENTIALS; form++)
+    for (int form = ALB_FORM_EXPONENTIAL; form <= ALB_FORM_THREE_EXPONENTIALS; form++)
         for (unsigned i = 0; i < 200; i++) {
             alb_random random = alb_random_at(2, (unsigned)form, i);
             const alb_profile profile = random_profile((alb_form)form, &random);
@@ -85,11 +89,13 @@ static void gradients(void **state)
                 up.parameters[p] += h;
                 down.parameters[p] -= h;
                 // central differences: h^2 = 1e-10 relative, rounding 1e-16 / 1e-5 of the largest term
-                const double size = alb_profile_value(&profile, r) + fabs(profile.parameters[2]);
+                const double size =
+                    alb_profile_value(&profile, r) + fabs(profile.parameters[2]) + profile.parameters[4];
                 check_near(h * gradient[p], (alb_profile_value(&up, r) - alb_profile_value(&down, r)) / 2,
                            1e-8 * fabs(h * gradient[p]) + 1e-14 * (size + profile.parameters[0]));
-                const double total_size = 2 * M_PI * (profile.parameters[0] / pow(profile.parameters[1], 2)) *
-                                          (1 + fabs(profile.parameters[2] / profile.parameters[0]));
+                const double total_size =
+                    2 * M_PI * (profile.parameters[0] / pow(profile.parameters[1], 2)) *
+                    (1 + (fabs(profile.parameters[2]) + profile.parameters[4]) / profile.parameters[0]);
                 check_near(h * total_gradient[p], (alb_profile_total(&up) - alb_profile_total(&down)) / 2,
                            1e-8 * fabs(h * total_gradient[p]) + 1e-14 * total_size);
             }

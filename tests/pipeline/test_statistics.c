@@ -36,12 +36,12 @@ static const char plan[] =
     "\"chessboard\"},\n"
     "   \"exposures_s\": [0.02]},\n"
     "  {\"name\": \"white\", \"target\": \"white_reference\", \"pattern\": {\"kind\": \"spot\", \"diameter_px\": 4},\n"
-    "   \"exposures_s\": [0.02, 0.3], \"repeats\": 4},\n"
+    "   \"exposures_s\": [0.01, 0.1], \"repeats\": 2},\n"
     "  {\"name\": \"r\", \"target\": \"slab\", \"pattern\": {\"kind\": \"spot\", \"diameter_px\": 4}, \"exposures_s\": "
-    "[0.2, 2, 20]},\n"
+    "[0.02, 0.5]},\n"
     "  {\"name\": \"t\", \"side\": \"transmission\", \"target\": \"slab\", \"pattern\": {\"kind\": \"spot\", "
     "\"diameter_px\": 4},\n"
-    "   \"exposures_s\": [2, 20]}]}\n";
+    "   \"exposures_s\": [0.05, 0.5]}]}\n";
 
 static void write_profile(alb_text *text, alb_side side)
 {
