@@ -27,6 +27,7 @@ template <typename Work> bool guarded(const char *name, alb_error *error, Work w
     try {
         static const bool quiet = [] {
             cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+            cv::setNumThreads(1); // calibrateCamera's threads add up the views as they finish: other sums each time
             cv::redirectError([](int, const char *, const char *, const char *, int, void *) { return 0; });
             return true;
         }();

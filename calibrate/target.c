@@ -67,14 +67,42 @@ bool alb_board_look(alb_board_views *views, const alb_image *photograph, const c
     return true;
 }
 
+static double rounded(double value, int digits)
+{
+    if (!(value > 0) || !isfinite(value))
+        return value;
+    const double unit = pow(10, floor(log10(value)) + 1 - digits);
+    return rint(value / unit) * unit;
+}
+
+// Same pictures, same bytes: OpenCV solves by LAPACK, and an optimised BLAS rounds by where its memory happens to lie,
+// so that from run to run the lens moves by up to 1e-7 of its sd. Rounded to a thousandth of the sd (a power of two) it
+// does not, but for one case in ten thousand.
+static void settle(alb_lens_estimate *estimate, double *rms, int count)
+{
+    alb_lens *l = &estimate->lens;
+    double *const values[9] = {&l->fx, &l->fy, &l->cx, &l->cy, &l->k1, &l->k2, &l->p1, &l->p2, &l->k3};
+    for (int i = 0; i < 9; i++) {
+        const double sd = estimate->sd[i], step = sd > 0 && isfinite(sd) ? exp2(floor(log2(sd)) - 10) : 0;
+        *values[i] = step > 0 ? rint(*values[i] / step) * step : *values[i];
+        estimate->sd[i] = rounded(sd, 4);
+    }
+    estimate->rms_px = rounded(estimate->rms_px, 9);
+    for (int v = 0; v < count; v++)
+        rms[v] = rounded(rms[v], 6);
+}
+
 static bool solve(alb_lens_estimate *estimate, double *rms, const double *corners, int count, const alb_board *board,
                   int width, int height, int terms, alb_error *error)
 {
     double points[2 * ALB_BOARD_POINTS_MAX];
     alb_transform poses[ALB_BOARD_VIEWS_MAX];
-    return board_points(points, board, error) &&
-           alb_vision_calibrate(estimate, poses, rms, corners, points, count, board->columns * board->rows, width,
-                                height, terms, error);
+    if (!board_points(points, board, error) ||
+        !alb_vision_calibrate(estimate, poses, rms, corners, points, count, board->columns * board->rows, width, height,
+                              terms, error))
+        return false;
+    settle(estimate, rms, count);
+    return true;
 }
 
 bool alb_board_lens(alb_lens_estimate *estimate, int *terms, alb_board_views *views, const alb_board *board, int width,

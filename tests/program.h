@@ -4,6 +4,7 @@
 #include "check.h"
 
 #include <sys/wait.h>
+#include <unistd.h>
 
 static char *output, *complaint; // of the last run
 
@@ -27,14 +28,23 @@ __attribute__((format(printf, 1, 2))) static inline int shell(const char *format
     return system(command);
 }
 
+// Where this process keeps what a run said: tests run side by side in one folder.
+static inline const char *said_path(const char *stream)
+{
+    static char path[64];
+    snprintf(path, sizeof path, "program_%d_%s.tmp", (int)getpid(), stream);
+    return path;
+}
+
 // Exit code of `alabaster ARGUMENTS`; 128 + signal where it died, 124 where it hung.
 static inline int run(const char *arguments)
 {
-    const int status = shell("timeout 60 '%s' %s >program_out.tmp 2>program_err.tmp", ALB_PROGRAM, arguments);
+    const int status = shell("timeout 60 '%s' %s >program_%d_out.tmp 2>program_%d_err.tmp", ALB_PROGRAM, arguments,
+                             (int)getpid(), (int)getpid());
     free(output);
     free(complaint);
-    output = slurp("program_out.tmp");
-    complaint = slurp("program_err.tmp");
+    output = slurp(said_path("out"));
+    complaint = slurp(said_path("err"));
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
@@ -63,6 +73,6 @@ static inline void forget_runs(void)
     free(output);
     free(complaint);
     output = complaint = NULL;
-    remove("program_out.tmp");
-    remove("program_err.tmp");
+    remove(said_path("out"));
+    remove(said_path("err"));
 }
