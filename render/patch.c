@@ -42,12 +42,18 @@ void alb_patches_free(alb_patches *patches)
     *patches = (alb_patches){0};
 }
 
+void alb_patch_triangle(alb_vector triangle[3], const alb_patches *patches, size_t patch)
+{
+    for (int k = 0; k < 3; k++)
+        triangle[k] = corner(patches->mesh, patch, k);
+}
+
 alb_vector alb_patch_point(const alb_patches *patches, size_t patch, double u, double v)
 {
-    const alb_vector a = corner(patches->mesh, patch, 0), b = corner(patches->mesh, patch, 1),
-                     c = corner(patches->mesh, patch, 2);
+    alb_vector t[3];
+    alb_patch_triangle(t, patches, patch);
     const double root = sqrt(u), wa = 1 - root, wb = root * (1 - v), wc = root * v;
-    const alb_vector point = alb_add(alb_times(wa, a), alb_add(alb_times(wb, b), alb_times(wc, c)));
+    const alb_vector point = alb_add(alb_times(wa, t[0]), alb_add(alb_times(wb, t[1]), alb_times(wc, t[2])));
     return alb_add(point, alb_times(patches->offset_mm, patches->normals[patch]));
 }
 

@@ -12,6 +12,7 @@ typedef struct alb_patches {
 
 bool alb_patches_create(alb_patches *patches, const alb_mesh *mesh, alb_error *error);
 void alb_patches_free(alb_patches *patches);
+void alb_patch_triangle(alb_vector triangle[3], const alb_patches *patches, size_t patch);
 // Uniform point of the triangle for u, v in [0, 1), offset_mm in front of it. Turk 1990: the square folded by a root.
 alb_vector alb_patch_point(const alb_patches *patches, size_t patch, double u, double v);
 

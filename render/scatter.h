@@ -64,6 +64,7 @@ size_t alb_scatter_bytes(const alb_scatter *scatter);
 bool alb_radial_create(alb_radial *radial, const alb_profile profiles[3], double end_mm, alb_error *error);
 void alb_radial_free(alb_radial *radial);
 
+double alb_longest_edge(const alb_vector triangle[3]);
 // Integral of S(|x - p|) over the triangle for three profiles, 1 = all that leaves the plane at most.
 void alb_scatter_triangle(double integral[3], const alb_radial *radial, const alb_vector triangle[3], alb_vector p);
 // The same by seven points, for p further from the triangle's middle than 1.25 of its longest edge.

@@ -119,6 +119,12 @@ static void add_edge(double integral[3], const alb_radial *radial, const double 
     }
 }
 
+double alb_longest_edge(const alb_vector t[3])
+{
+    return fmax(alb_length(alb_sub(t[1], t[0])),
+                fmax(alb_length(alb_sub(t[2], t[1])), alb_length(alb_sub(t[0], t[2]))));
+}
+
 void alb_scatter_triangle(double integral[3], const alb_radial *radial, const alb_vector triangle[3], alb_vector p)
 {
     const alb_vector normal = alb_unit(alb_cross(alb_sub(triangle[1], triangle[0]), alb_sub(triangle[2], triangle[0])));
