@@ -1,8 +1,9 @@
 // JSON records by jansson. The tree holds no positions, so an error finds the value's path by searching the tree for it
-// and then its line and column by walking the text along that path.
+// and then its line and column by walking the text along that path (record_locate.c).
 #include "base/record.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/record_locate.h"
 #include <jansson.h>
 #include <math.h>
 #include <stdarg.h>
@@ -17,11 +18,6 @@ struct alb_record {
     size_t size;
     json_t *top;
 };
-
-typedef struct step {
-    const char *key; // NULL: list item
-    size_t index;
-} step;
 
 alb_record *alb_record_parse(const char *name, const char *bytes, size_t size, alb_error *error)
 {
@@ -74,64 +70,7 @@ void alb_record_free(alb_record *record)
     free(record);
 }
 
-static const char *skip_space(const char *t) { return t + strspn(t, " \t\r\n"); }
-
-static const char *skip_string(const char *t)
-{
-    for (t++; *t && *t != '"'; t++)
-        if (*t == '\\' && t[1])
-            t++;
-    return *t ? t + 1 : t;
-}
-
-// Past one value of text that is known to be valid JSON.
-static const char *skip_value(const char *t)
-{
-    t = skip_space(t);
-    if (*t == '"')
-        return skip_string(t);
-    if (*t != '{' && *t != '[')
-        return t + strcspn(t, ",]} \t\r\n");
-    int depth = 0;
-    do {
-        if (*t == '"') {
-            t = skip_string(t);
-            continue;
-        }
-        depth += (*t == '{' || *t == '[') - (*t == '}' || *t == ']');
-        t++;
-    } while (depth > 0 && *t);
-    return t;
-}
-
-// The text of the value that the path leads to (the key of a last step that is a key).
-static const char *locate(const char *text, const step *path, int depth)
-{
-    const char *t = skip_space(text);
-    for (int i = 0; i < depth && *t; i++) {
-        size_t index = 0;
-        for (t = skip_space(t + 1); *t && *t != '}' && *t != ']'; index++) {
-            const char *start = t;
-            bool here = !path[i].key && index == path[i].index;
-            if (path[i].key) {
-                const size_t length = strlen(path[i].key);
-                here = !strncmp(t + 1, path[i].key, length) && t[1 + length] == '"';
-                t = skip_space(skip_space(skip_string(t)) + 1);
-            }
-            if (here) {
-                if (i + 1 == depth)
-                    t = start;
-                break;
-            }
-            t = skip_space(skip_value(t));
-            if (*t == ',')
-                t = skip_space(t + 1);
-        }
-    }
-    return t;
-}
-
-static int find(const json_t *tree, const json_t *wanted, step *path, int depth)
+static int find(const json_t *tree, const json_t *wanted, alb_step *path, int depth)
 {
     if (tree == wanted)
         return depth;
@@ -144,14 +83,14 @@ static int find(const json_t *tree, const json_t *wanted, step *path, int depth)
     if (json_is_object(tree)) {
         for (void *i = json_object_iter((json_t *)tree); i; i = json_object_iter_next((json_t *)tree, i)) {
             key = json_object_iter_key(i);
-            path[depth] = (step){key, 0};
+            path[depth] = (alb_step){key, 0};
             if ((found = find(json_object_iter_value(i), wanted, path, depth + 1)) >= 0)
                 return found;
         }
     } else if (json_is_array(tree))
         json_array_foreach(tree, index, value)
         {
-            path[depth] = (step){NULL, index};
+            path[depth] = (alb_step){NULL, index};
             if ((found = find(value, wanted, path, depth + 1)) >= 0)
                 return found;
         }
@@ -161,27 +100,17 @@ static int find(const json_t *tree, const json_t *wanted, step *path, int depth)
 static bool fail_at(alb_error *error, alb_node node, const char *key, const char *index_key, size_t index,
                     const char *message)
 {
-    step path[DEPTH_MAX + 1];
+    alb_step path[DEPTH_MAX + 1];
     int depth = find(node.record->top, node.value, path, 0);
     if (depth < 0)
         return alb_fail(error, ALB_BAD_DATA, "%s: %s", node.record->name, message);
     if (key && json_is_object((const json_t *)node.value) && json_object_get(node.value, key))
-        path[depth++] = (step){key, 0};
+        path[depth++] = (alb_step){key, 0};
     if (index_key)
-        path[depth++] = (step){NULL, index};
-    char name[512] = "";
-    size_t size = 0;
-    for (int i = 0; i < depth && size < sizeof name; i++)
-        size += (size_t)(path[i].key ? snprintf(name + size, sizeof name - size, "%s%s", i ? "." : "", path[i].key)
-                                     : snprintf(name + size, sizeof name - size, "[%zu]", path[i].index));
-    const char *place = locate(node.record->text, path, depth);
-    int line = 1, column = 1;
-    for (const char *t = node.record->text; t < place; t++) {
-        column = *t == '\n' ? 1 : column + 1;
-        line += *t == '\n';
-    }
-    return alb_fail(error, ALB_BAD_DATA, "%s:%d:%d: %s%s%s", node.record->name, line, column, name, *name ? ": " : "",
-                    message);
+        path[depth++] = (alb_step){NULL, index};
+    const alb_place place = alb_record_locate(node.record->text, path, depth);
+    return alb_fail(error, ALB_BAD_DATA, "%s:%d:%d: %s%s%s", node.record->name, place.line, place.column, place.name,
+                    *place.name ? ": " : "", message);
 }
 
 bool alb_node_fail(alb_error *error, alb_node node, const char *key, const char *format, ...)
@@ -246,6 +175,16 @@ static const json_t *member(alb_node object, const char *key, alb_error *error)
     return value;
 }
 
+// The member, required to be of the type; `expected` is what the error calls it.
+static const json_t *member_of(alb_node object, const char *key, json_type type, const char *expected, alb_error *error)
+{
+    const json_t *value = member(object, key, error);
+    if (!value || json_typeof(value) == type)
+        return value;
+    alb_node_fail(error, object, key, "expected %s, found %s", expected, type_name(value));
+    return NULL;
+}
+
 // A number in bounds, or why not in message.
 static bool number_of(double *out, const json_t *value, double minimum, double maximum, char message[128])
 {
@@ -300,11 +239,9 @@ bool alb_node_boolean(bool *out, alb_node object, const char *key, alb_error *er
 
 bool alb_node_text(const char **out, alb_node object, const char *key, alb_error *error)
 {
-    const json_t *value = member(object, key, error);
+    const json_t *value = member_of(object, key, JSON_STRING, "text", error);
     if (!value)
         return false;
-    if (!json_is_string(value))
-        return alb_node_fail(error, object, key, "expected text, found %s", type_name(value));
     if (strlen(json_string_value(value)) != json_string_length(value))
         return alb_node_fail(error, object, key, "text with a NUL character");
     *out = json_string_value(value);
@@ -313,11 +250,9 @@ bool alb_node_text(const char **out, alb_node object, const char *key, alb_error
 
 bool alb_node_list(alb_node *out, size_t *count, alb_node object, const char *key, alb_error *error)
 {
-    const json_t *value = member(object, key, error);
+    const json_t *value = member_of(object, key, JSON_ARRAY, "a list", error);
     if (!value)
         return false;
-    if (!json_is_array(value))
-        return alb_node_fail(error, object, key, "expected a list, found %s", type_name(value));
     *out = (alb_node){object.record, value};
     *count = json_array_size(value);
     return true;
@@ -325,11 +260,9 @@ bool alb_node_list(alb_node *out, size_t *count, alb_node object, const char *ke
 
 bool alb_node_object(alb_node *out, alb_node object, const char *key, alb_error *error)
 {
-    const json_t *value = member(object, key, error);
+    const json_t *value = member_of(object, key, JSON_OBJECT, "an object", error);
     if (!value)
         return false;
-    if (!json_is_object(value))
-        return alb_node_fail(error, object, key, "expected an object, found %s", type_name(value));
     *out = (alb_node){object.record, value};
     return true;
 }

@@ -1,0 +1,97 @@
+// "materials" of SCENE.json: measured, a dipole, or opaque.
+#include "base/memory.h"
+#include "render/scene_reader.h"
+#include <stdio.h>
+#include <string.h>
+
+static bool read_slab_path(bool *slab, alb_node node, alb_error *error)
+{
+    const char *path = "solid";
+    if (alb_node_has(node, "path") && !alb_node_text(&path, node, "path", error))
+        return false;
+    *slab = !strcmp(path, "slab");
+    return *slab || !strcmp(path, "solid") ||
+           alb_node_fail(error, node, "path", "'%s' is neither slab nor solid", path);
+}
+
+// The profile of a colour channel: by name, or the only one there is.
+static const alb_profile *profile_of(const alb_material *material, alb_side side, int c)
+{
+    static const char *const names[3] = {"R", "G", "B"};
+    for (int k = 0; k < material->channels; k++)
+        if (material->channels == 1 || !strcmp(material->channel_names[k], names[c]))
+            return &material->fitted[side][k].profile;
+    return NULL;
+}
+
+static bool read_measured(alb_surface *surface, alb_scene_reader *in, alb_node node)
+{
+    char path[ALB_PATH_SIZE];
+    alb_material material;
+    if (!alb_node_allow(node, "measured path", in->error) || !alb_scene_input(path, in, node, "measured") ||
+        !alb_material_read(&material, path, in->error) || !read_slab_path(&surface->slab, node, in->error))
+        return false;
+    surface->scatters = true;
+    for (int side = 0; side <= (surface->slab ? ALB_TRANSMISSION : ALB_REFLECTION); side++)
+        for (int c = 0; c < 3; c++) {
+            const alb_profile *profile = profile_of(&material, (alb_side)side, c);
+            if (!profile || profile->form == ALB_FORM_NONE)
+                return alb_node_fail(in->error, node, "measured", "%s has no %s profile for channel %c%s", path,
+                                     alb_side_names[side], "RGB"[c],
+                                     side == ALB_TRANSMISSION ? "; \"path\": \"solid\" needs reflection alone" : "");
+            surface->profiles[side][c] = *profile;
+        }
+    return true;
+}
+
+static bool read_dipole(alb_surface *surface, alb_node node, alb_error *error)
+{
+    alb_node dipole;
+    double absorption[3], scattering[3], index;
+    if (!alb_node_allow(node, "dipole", error) || !alb_node_object(&dipole, node, "dipole", error) ||
+        !alb_node_allow(dipole, "absorption_per_mm reduced_scattering_per_mm refractive_index", error) ||
+        !alb_node_numbers(absorption, 3, dipole, "absorption_per_mm", 1e-9, 1e4, error) ||
+        !alb_node_numbers(scattering, 3, dipole, "reduced_scattering_per_mm", 1e-9, 1e4, error) ||
+        !alb_node_number(&index, dipole, "refractive_index", 1, 3, error))
+        return false;
+    surface->scatters = true;
+    for (int c = 0; c < 3; c++)
+        surface->profiles[ALB_REFLECTION][c] =
+            (alb_profile){.form = ALB_FORM_DIPOLE, .parameters = {absorption[c], scattering[c], index}};
+    return true;
+}
+
+static bool read_surface(alb_surface *surface, alb_scene_reader *in, alb_node node)
+{
+    if (alb_node_has(node, "measured"))
+        return read_measured(surface, in, node);
+    if (alb_node_has(node, "dipole"))
+        return read_dipole(surface, node, in->error);
+    return alb_node_allow(node, "reflectance exitance", in->error) &&
+           alb_node_numbers(surface->reflectance, 3, node, "reflectance", 0, 1, in->error) &&
+           (!alb_node_has(node, "exitance") ||
+            alb_node_numbers(surface->exitance, 3, node, "exitance", 0, 1e12, in->error));
+}
+
+bool alb_scene_read_surfaces(alb_scene_reader *in, alb_node root)
+{
+    alb_node list;
+    if (!alb_node_object(&list, root, "materials", in->error))
+        return false;
+    const size_t count = alb_node_key_count(list);
+    if (count > ALB_SURFACES_MAX)
+        return alb_node_fail(in->error, list, NULL, "%zu materials; at most %d", count, ALB_SURFACES_MAX);
+    if (!(in->scene->surfaces = alb_allocate(count, sizeof *in->scene->surfaces, in->error)))
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        const char *name = alb_node_key(list, i);
+        alb_node node;
+        if (strlen(name) >= ALB_GROUP_NAME)
+            return alb_node_fail(in->error, list, NULL, "material name '%.80s' is too long", name);
+        snprintf(in->scene->surfaces[i].name, ALB_GROUP_NAME, "%s", name);
+        if (!alb_node_object(&node, list, name, in->error) || !read_surface(&in->scene->surfaces[i], in, node))
+            return false;
+    }
+    in->scene->surface_count = count;
+    return true;
+}
