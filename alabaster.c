@@ -12,7 +12,7 @@ enum { COMMANDS = sizeof commands / sizeof commands[0] };
 static const alb_command *find(const char *name)
 {
     for (int i = 0; i < COMMANDS; i++)
-        if (commands[i] && !strcmp(commands[i]->name, name))
+        if (!strcmp(commands[i]->name, name))
             return commands[i];
     return NULL;
 }
@@ -22,8 +22,7 @@ static void help(void)
     printf("alabaster measures how translucent materials scatter light, and renders them beside their photograph\n\n"
            "usage: alabaster COMMAND ...\n\n");
     for (int i = 0; i < COMMANDS; i++)
-        if (commands[i])
-            printf("  %-10s %s\n", commands[i]->name, commands[i]->summary);
+        printf("  %-10s %s\n", commands[i]->name, commands[i]->summary);
     printf("  %-10s %s\n\nalabaster help COMMAND tells more; alabaster --version names the version.\n"
            "exit codes: 0 ok, 1 differs, 2 usage, 3 access, 4 bad data, 5 the measurement does not decide,\n"
            "            6 memory, 7 internal\n",

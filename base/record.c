@@ -70,6 +70,7 @@ void alb_record_free(alb_record *record)
     free(record);
 }
 
+// The steps from the tree to the value wanted and how many they are; -1 where it lies deeper than DEPTH_MAX.
 static int find(const json_t *tree, const json_t *wanted, alb_step *path, int depth)
 {
     if (tree == wanted)
@@ -97,8 +98,8 @@ static int find(const json_t *tree, const json_t *wanted, alb_step *path, int de
     return -1;
 }
 
-static bool fail_at(alb_error *error, alb_node node, const char *key, const char *index_key, size_t index,
-                    const char *message)
+// key, or item: of the node, where the error is about one of its values; NULL: about the node itself.
+static bool fail_at(alb_error *error, alb_node node, const char *key, const size_t *item, const char *message)
 {
     alb_step path[DEPTH_MAX + 1];
     int depth = find(node.record->top, node.value, path, 0);
@@ -106,8 +107,8 @@ static bool fail_at(alb_error *error, alb_node node, const char *key, const char
         return alb_fail(error, ALB_BAD_DATA, "%s: %s", node.record->name, message);
     if (key && json_is_object((const json_t *)node.value) && json_object_get(node.value, key))
         path[depth++] = (alb_step){key, 0};
-    if (index_key)
-        path[depth++] = (alb_step){NULL, index};
+    if (item)
+        path[depth++] = (alb_step){NULL, *item};
     const alb_place place = alb_record_locate(node.record->text, path, depth);
     return alb_fail(error, ALB_BAD_DATA, "%s:%d:%d: %s%s%s", node.record->name, place.line, place.column, place.name,
                     *place.name ? ": " : "", message);
@@ -120,14 +121,12 @@ bool alb_node_fail(alb_error *error, alb_node node, const char *key, const char 
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
-    return fail_at(error, node, key, NULL, 0, message);
+    return fail_at(error, node, key, NULL, message);
 }
-
-alb_node alb_record_top(const alb_record *record) { return (alb_node){record, record->top}; }
 
 bool alb_record_root(alb_node *root, const alb_record *record, alb_error *error)
 {
-    *root = alb_record_top(record);
+    *root = (alb_node){record, record->top};
     if (!json_is_object(record->top))
         return alb_node_fail(error, *root, NULL, "expected an object at the top");
     long format;
@@ -286,7 +285,7 @@ alb_node alb_node_item(alb_node list, size_t i) { return (alb_node){list.record,
 
 static bool item_fail(alb_error *error, alb_node list, size_t i, const char *message)
 {
-    return fail_at(error, list, NULL, "", i, message);
+    return fail_at(error, list, NULL, &i, message);
 }
 
 bool alb_node_item_number(double *out, alb_node list, size_t i, double minimum, double maximum, alb_error *error)

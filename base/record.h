@@ -6,7 +6,7 @@
 
 typedef struct alb_record alb_record; // one parsed file
 
-// A value inside a record: `value` within the object or list `parent`. Valid as long as the record lives.
+// A value inside a record. Valid as long as the record lives.
 typedef struct alb_node {
     const alb_record *record;
     const void *value;
@@ -19,8 +19,6 @@ alb_record *alb_record_parse(const char *name, const char *bytes, size_t size, a
 void alb_record_free(alb_record *record);
 // The top object; requires "format": 1 there and fails otherwise.
 bool alb_record_root(alb_node *root, const alb_record *record, alb_error *error);
-// The top value without any check.
-alb_node alb_record_top(const alb_record *record);
 
 // Fails unless every key of the object is one of the space-separated `keys`.
 bool alb_node_allow(alb_node object, const char *keys, alb_error *error);

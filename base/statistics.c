@@ -45,14 +45,3 @@ double alb_median(double *values, size_t count)
     qsort(values, count, sizeof *values, ascending);
     return count % 2 ? values[count / 2] : (values[count / 2 - 1] + values[count / 2]) / 2;
 }
-
-double alb_sum(const double *values, size_t count)
-{
-    double sum = 0, lost = 0;
-    for (size_t i = 0; i < count; i++) {
-        const double next = sum + values[i];
-        lost += fabs(sum) >= fabs(values[i]) ? sum - next + values[i] : values[i] - next + sum;
-        sum = next;
-    }
-    return sum + lost;
-}

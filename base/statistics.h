@@ -6,5 +6,3 @@
 double alb_chi_square_tail(double chi_square, double dof);
 // Median; sorts the values in place. NaN for none.
 double alb_median(double *values, size_t count);
-// Sum with Neumaier's compensation.
-double alb_sum(const double *values, size_t count);

@@ -93,7 +93,8 @@ void alb_lit_face_free(alb_lit_face *face)
     *face = (alb_lit_face){0};
 }
 
-double alb_lit_face_irradiance(const alb_lit_face *face, double x_mm, double y_mm)
+// Light that falls on the point, per irradiance of a white pixel.
+static double irradiance_at(const alb_lit_face *face, double x_mm, double y_mm)
 {
     if (face->kind == ALB_PATTERN_WHITE)
         return 1;
@@ -125,7 +126,7 @@ static void exitance(double out[3], const alb_lit_face *face, double x_mm, doubl
             for (int c = 0; c < 3; c++)
                 sum[c] += alb_kernel_value(&face->kernels[c], r);
         }
-    const double e = alb_lit_face_irradiance(face, x_mm, y_mm);
+    const double e = irradiance_at(face, x_mm, y_mm);
     for (int c = 0; c < 3; c++)
         out[c] = face->kind == ALB_PATTERN_WHITE ? face->kernels[c].total
                                                  : sum[c] * face->point_mm2 + face->kernels[c].unscattered * e;
@@ -137,7 +138,7 @@ void alb_lit_face_radiance(double out[3], const void *scene, double x_mm, double
     if (face->kernels) {
         exitance(out, face, x_mm, y_mm);
     } else {
-        const double e = alb_lit_face_irradiance(face, x_mm, y_mm);
+        const double e = irradiance_at(face, x_mm, y_mm);
         for (int c = 0; c < 3; c++)
             out[c] = face->reflectance[c] * e;
     }

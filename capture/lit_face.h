@@ -25,7 +25,5 @@ typedef struct alb_lit_face {
 bool alb_lit_face_create(alb_lit_face *face, const alb_truth *truth, const alb_pattern *pattern,
                          const alb_kernel *kernels, const double white_reflectance[3], alb_error *error);
 void alb_lit_face_free(alb_lit_face *face);
-// Light that falls on the point, per irradiance of a white pixel.
-double alb_lit_face_irradiance(const alb_lit_face *face, double x_mm, double y_mm);
 // Radiance W/(mm^2 sr) of three channels; `face` is an alb_lit_face (the shape that alb_flat_scene wants).
 void alb_lit_face_radiance(double out[3], const void *face, double x_mm, double y_mm);

@@ -97,11 +97,3 @@ void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, c
             out[patch][c] = sum[c] / (double)rays;
     }
 }
-
-double alb_form_factors_sky(const alb_form_factors *factors, size_t patch)
-{
-    size_t sky = 0;
-    for (size_t q = 0; q < (size_t)factors->rays; q++)
-        sky += factors->hits[patch * (size_t)factors->rays + q] == factors->patch_count;
-    return (double)sky / factors->rays;
-}

@@ -24,5 +24,3 @@ void alb_form_factors_free(alb_form_factors *factors);
 alb_vector alb_form_factors_direction(const alb_form_factors *factors, const alb_patches *patches, size_t patch, int q);
 // out = F radiosity, RGB: the irradiance that patches send to each other. out and radiosity have patch_count rows.
 void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3]);
-// Share of the patch's rays that end at the sky.
-double alb_form_factors_sky(const alb_form_factors *factors, size_t patch);
