@@ -20,7 +20,7 @@ static bool lit(const alb_image *m, int x, int y, int channels, const double *pe
     return false;
 }
 
-// A single hot value must not count: a lit pixel needs two lit neighbours in its row or column.
+// A single hot value must not count: a lit pixel needs two lit ones among its four neighbours.
 static bool lit_region(disc *region, const alb_image *m, int channels, const char *shot, alb_error *error)
 {
     double peak[3] = {0}, su = 0, sv = 0;
@@ -35,7 +35,7 @@ static bool lit_region(disc *region, const alb_image *m, int channels, const cha
     if (saturated)
         return alb_fail(error, ALB_BAD_DATA, "shot %s: %ld values are saturated at the shortest exposure; shorten it",
                         shot, saturated);
-    for (int pass = 0; pass < 2; pass++)
+    for (int pass = 0; pass < 2; pass++) { // the middle, then the radius about it
         for (int y = 1; y + 1 < m->height; y++)
             for (int x = 1; x + 1 < m->width; x++) {
                 if (!lit(m, x, y, channels, peak) ||
@@ -48,9 +48,9 @@ static bool lit_region(disc *region, const alb_image *m, int channels, const cha
                     count++;
                 } else
                     region->radius = fmax(region->radius, hypot(x - region->u, y - region->v));
-                region->u = pass ? region->u : su / (double)count;
-                region->v = pass ? region->v : sv / (double)count;
             }
+        region->u = su / (double)count, region->v = sv / (double)count;
+    }
     if (!count)
         return alb_fail(error, ALB_BAD_DATA,
                         "shot %s: no light is to be seen on the white reference; lengthen the exposure", shot);
@@ -83,7 +83,7 @@ bool alb_flux_measure(alb_estimate flux[3], const alb_image *merged, const alb_c
             }
         }
     for (int c = 0; c < channels; c++) {
-        const double factor = 3.141592653589793 / reflectance[c];
+        const double factor = M_PI / reflectance[c];
         flux[c] = (alb_estimate){factor * sum[c], factor * sqrt(variance[c])};
         if (!(flux[c].value > 10 * flux[c].sd))
             return alb_fail(error, ALB_BAD_DATA, "shot %s: the flux in channel %s is %.3g +- %.3g: lost in noise", shot,

@@ -1,5 +1,7 @@
 // alabaster calibrate: session -> calibration.
 #include "base/command.h"
+#include "base/exr.h"
+#include "base/memory.h"
 #include "base/progress.h"
 #include "calibrate/calibration_file.h"
 #include "calibrate/flat.h"
@@ -10,8 +12,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "base/exr.h"
 
 static const char usage[] =
     "usage: alabaster calibrate SESSION [--json]\n"
@@ -137,9 +137,9 @@ static bool print_file(const char *folder, alb_error *error)
 
 static bool calibrate_session(const char *folder, bool as_json, alb_error *error)
 {
-    work *w = calloc(1, sizeof *w);
+    work *w = alb_allocate(1, sizeof *w, error);
     if (!w)
-        return alb_fail(error, ALB_NO_MEMORY, "out of memory");
+        return false;
     bool ok = measure(w, folder, error) && write_results(w, error);
     if (ok && as_json)
         ok = print_file(folder, error);
@@ -157,20 +157,39 @@ static bool board_size(alb_board *board, const char *text, const char *square, a
     return alb_option_number(&board->square_mm, "--square-mm", square, 1e-6, 1e6, error);
 }
 
+static void print_lens(const alb_lens_estimate *estimate, const alb_board_views *views)
+{
+    const alb_lens *l = &estimate->lens;
+    const double *sd = estimate->sd;
+    alb_geometry_print(views);
+    printf("fx %.3f +- %.3f  fy %.3f +- %.3f  cx %.3f +- %.3f  cy %.3f +- %.3f px\n", l->fx, sd[0], l->fy, sd[1], l->cx,
+           sd[2], l->cy, sd[3]);
+    printf("k1 %.5f  k2 %.5f  p1 %.5f  p2 %.5f  k3 %.5f\n", l->k1, l->k2, l->p1, l->p2, l->k3);
+    printf("rms %.4f px over %d photographs (2-D: sqrt(mean(du^2 + dv^2)))\n", estimate->rms_px, views->found_count);
+}
+
+static void put_lens(alb_json *json, const alb_lens_estimate *estimate, const alb_board_views *views)
+{
+    alb_lens_write(json, &estimate->lens, estimate->sd, estimate->rms_px);
+    alb_json_list(json, "views");
+    for (int v = 0; v < views->count; v++) {
+        alb_json_object(json, NULL);
+        alb_json_string(json, "name", views->name[v]);
+        alb_json_boolean(json, "found", views->found[v]);
+        alb_json_number(json, "rms_px", views->rms_px[v]);
+        alb_json_end_object(json);
+    }
+    alb_json_end_list(json);
+}
+
 static bool calibrate_photographs(const char *folder, const alb_board *board, const char *out, bool as_json,
                                   alb_error *error)
 {
     alb_board_views views = {0};
     alb_lens_estimate estimate;
     bool ok = alb_geometry_photographs(&estimate, &views, folder, board, error);
-    if (ok && !as_json) {
-        alb_geometry_print(&views);
-        const alb_lens *l = &estimate.lens;
-        printf("fx %.3f +- %.3f  fy %.3f +- %.3f  cx %.3f +- %.3f  cy %.3f +- %.3f px\n", l->fx, estimate.sd[0], l->fy,
-               estimate.sd[1], l->cx, estimate.sd[2], l->cy, estimate.sd[3]);
-        printf("k1 %.5f  k2 %.5f  p1 %.5f  p2 %.5f  k3 %.5f\n", l->k1, l->k2, l->p1, l->p2, l->k3);
-        printf("rms %.4f px over %d photographs (2-D: sqrt(mean(du^2 + dv^2)))\n", estimate.rms_px, views.found_count);
-    }
+    if (ok && !as_json)
+        print_lens(&estimate, &views);
     alb_provenance provenance = {.command = "calibrate"};
     snprintf(provenance.options, sizeof provenance.options, "--board %dx%d --square-mm %.9g", board->columns,
              board->rows, board->square_mm);
@@ -179,16 +198,7 @@ static bool calibrate_photographs(const char *folder, const alb_board *board, co
             continue;
         alb_json json;
         alb_json_begin(&json, &provenance);
-        alb_lens_write(&json, &estimate.lens, estimate.sd, estimate.rms_px);
-        alb_json_list(&json, "views");
-        for (int v = 0; v < views.count; v++) {
-            alb_json_object(&json, NULL);
-            alb_json_string(&json, "name", views.name[v]);
-            alb_json_boolean(&json, "found", views.found[v]);
-            alb_json_number(&json, "rms_px", views.rms_px[v]);
-            alb_json_end_object(&json);
-        }
-        alb_json_end_list(&json);
+        put_lens(&json, &estimate, &views);
         ok = to_file ? alb_json_write(&json, out, error) : alb_json_print(&json, error);
     }
     alb_board_views_free(&views);

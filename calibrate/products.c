@@ -1,8 +1,8 @@
 // From merged exposures to numbers per incident flux. With X the merged rate (DN/s), V the vignetting, L = k X / V the
 // radiance (k the camera's unknown responsivity) and Phi = pi / rho * integral L dA from the white reference:
 //   white reference:  E / Phi = pi L / (rho Phi)        slab:  L / Phi
-// k cancels. Both need the same exposure times' unit, the same lens aperture and the same light; a lamp that drifts
-// between the two photographs is an error of scale that nothing here can see.
+// k cancels. Both need the same lens aperture and the same light; a lamp that drifts between the two photographs is
+// an error of scale that nothing here can see.
 #include "calibrate/products.h"
 #include "calibrate/absolute.h"
 #include "calibrate/flat.h"
@@ -72,7 +72,7 @@ static bool make_white(alb_calibration *c, alb_image *image, alb_estimate flux[3
         return false;
     double factor[3];
     for (int i = 0; i < c->channels; i++)
-        factor[i] = 3.141592653589793 / (session->plan.white_reflectance[i] * flux[i].value);
+        factor[i] = M_PI / (session->plan.white_reflectance[i] * flux[i].value);
     multiply(image, factor, c->channels);
     return true;
 }
