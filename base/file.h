@@ -8,8 +8,8 @@ enum { ALB_PATH_SIZE = 4096, ALB_HASH_SIZE = 65 };
 
 bool alb_file_exists(const char *path);
 bool alb_file_is_directory(const char *path);
-// Reads the whole file; *bytes is NUL-terminated one past *size and owned by the caller (free). Refuses files over 2
-// GiB.
+// Reads the whole file; *bytes ends with a NUL that *size does not count and is the caller's (free). Refuses devices
+// and more than 2 GiB.
 bool alb_file_read(char **bytes, size_t *size, const char *path, alb_error *error);
 // Writes to a temporary name beside `path` and renames: `path` holds the old bytes or the new ones, never a part.
 bool alb_file_write(const char *path, const void *bytes, size_t size, alb_error *error);
@@ -19,7 +19,7 @@ bool alb_file_write_text(const char *path, const alb_text *text, alb_error *erro
 // stands at `path` now, if anything, is an ordinary file (a folder or a device is never replaced).
 bool alb_file_check_target(const char *path, alb_error *error);
 // For libraries that write a file themselves: choose the temporary name, then commit (rename) or abandon (remove) it.
-// An interrupt (SIGINT, SIGTERM) removes the temporary file that is open at that moment.
+// An interrupt (SIGINT, SIGTERM, SIGHUP) removes the temporary files that are under way, 16 of them at most.
 bool alb_file_begin(char temporary[ALB_PATH_SIZE], const char *path, alb_error *error);
 bool alb_file_commit(const char *temporary, const char *path, alb_error *error);
 void alb_file_abandon(const char *temporary);

@@ -1,3 +1,4 @@
+// calloc with the multiplication checked. Half of SIZE_MAX is as much as any object may take.
 #include "base/memory.h"
 #include <stdint.h>
 #include <stdlib.h>

@@ -1,3 +1,5 @@
+// Which photographs of a session, or of a folder, show the board, and what is asked of them: the lens from all, a
+// pose from the one that lies on a face. The mathematics stands in target.c.
 #include "calibrate/geometry.h"
 #include "calibrate/frames.h"
 #include <dirent.h>

@@ -1,6 +1,6 @@
 // Iterated maximum likelihood. Exposure i with time t_i, n_i frames of mean y_i, black b, gain K, read noise s:
-//   y_i = b + x t_i,   Var y_i = (K max(x, 0) t_i + s^2) / n_i,   x = sum w_i (y_i - b) / t_i / sum w_i,   w_i = t_i^2
-//   / Var y_i
+//   y_i = b + x t_i,                          Var y_i = (K max(x, 0) t_i + s^2) / n_i
+//   x = sum w_i (y_i - b) / t_i / sum w_i,    w_i = t_i^2 / Var y_i
 // with the variance from the current estimate of x, never from the noisy sample, which would favour samples that happen
 // to be dark. Clipping is tested on the estimate as well: an exposure counts while b + x t + 4 sd stays below the white
 // level. Var x = 1 / sum w_i. Tent weights (Debevec & Malik 1997) would ignore photon statistics: near black they lose
@@ -47,7 +47,7 @@ bool alb_merge_pixel(double *rate, double *variance, const alb_exposure *exposur
     return true;
 }
 
-// Running sums of all frames of one exposure: mean and clipping per value.
+// Mean of all frames of one exposure, and whether any of them is clipped, per value.
 static bool sum_frames(float *mean, unsigned char *clipped, const alb_session *session, const alb_shot *shot,
                        int exposure, alb_error *error)
 {

@@ -1,3 +1,4 @@
+// The page of a calibration: sensor, vignetting, lens and pose, and a picture of every product.
 #include "calibrate/report.h"
 #include "base/memory.h"
 #include "base/page.h"

@@ -1,3 +1,4 @@
+// KIND:ARGUMENT -> the rig of that kind.
 #include "capture/rig.h"
 #include <string.h>
 
