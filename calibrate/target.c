@@ -220,8 +220,8 @@ bool alb_board_length_sd(double *relative_sd, const alb_board_views *views, int 
         squares += (lengths[out] / mean - 1) * (lengths[out] / mean - 1);
     alb_transform pose;
     ok = ok && alb_board_pose(&pose, &rms, views, view, board, lens, error);
-    const double corner_variance =
-        0.5 * rms * rms * points / (points - 3.0); // an axis; six parameters for 2 points data
+    // of one axis; six parameters from 2 points numbers
+    const double corner_variance = 0.5 * rms * rms * points / (points - 3.0);
     const double spread = spread_px2(own, points);
     const double systematic_variance = corner_bias_px * corner_bias_px * points; // all corners outwards, say
     *relative_sd = sqrt(squares * (count - 1) / count + (corner_variance + systematic_variance) / spread);
