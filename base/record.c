@@ -247,6 +247,20 @@ bool alb_node_text(const char **out, alb_node object, const char *key, alb_error
     return true;
 }
 
+bool alb_node_choice(int *out, alb_node object, const char *key, const char *const *names, int count, alb_error *error)
+{
+    const char *text;
+    if (!alb_node_text(&text, object, key, error))
+        return false;
+    for (int i = 0; i < count; i++)
+        if (!strcmp(text, names[i]))
+            return *out = i, true;
+    char known[128] = "";
+    for (int i = 0; i < count; i++)
+        snprintf(known + strlen(known), sizeof known - strlen(known), "%s%s", i ? ", " : "", names[i]);
+    return alb_node_fail(error, object, key, "found \"%.40s\", expected one of %s", text, known);
+}
+
 bool alb_node_list(alb_node *out, size_t *count, alb_node object, const char *key, alb_error *error)
 {
     const json_t *value = member_of(object, key, JSON_ARRAY, "a list", error);

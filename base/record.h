@@ -28,6 +28,8 @@ bool alb_node_number(double *out, alb_node object, const char *key, double minim
 bool alb_node_integer(long *out, alb_node object, const char *key, long minimum, long maximum, alb_error *error);
 bool alb_node_boolean(bool *out, alb_node object, const char *key, alb_error *error);
 bool alb_node_text(const char **out, alb_node object, const char *key, alb_error *error); // borrowed
+// Text that is one of `count` names; its index.
+bool alb_node_choice(int *out, alb_node object, const char *key, const char *const *names, int count, alb_error *error);
 // Exactly `count` numbers.
 bool alb_node_numbers(double *out, size_t count, alb_node object, const char *key, double minimum, double maximum,
                       alb_error *error);

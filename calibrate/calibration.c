@@ -177,17 +177,6 @@ static bool read_views(alb_calibration *c, alb_node root, alb_error *error)
     return true;
 }
 
-static bool read_name(int *index, alb_node node, const char *key, const char *const *names, int count, alb_error *error)
-{
-    const char *text;
-    if (!alb_node_text(&text, node, key, error))
-        return false;
-    for (*index = 0; *index < count; ++*index)
-        if (!strcmp(text, names[*index]))
-            return true;
-    return alb_node_fail(error, node, key, "\"%.60s\" is none of those known", text);
-}
-
 static bool read_product(alb_product *p, alb_node node, int channels, alb_error *error)
 {
     alb_node pattern;
@@ -196,11 +185,11 @@ static bool read_product(alb_product *p, alb_node node, int channels, alb_error 
     long columns, rows;
     if (!alb_node_allow(node, "shot side target pattern relative_scale_sd", error) ||
         !alb_node_text(&shot, node, "shot", error) ||
-        !read_name(&side, node, "side", alb_side_names, ALB_SIDES, error) ||
-        !read_name(&target, node, "target", alb_target_names, ALB_TARGETS, error) ||
+        !alb_node_choice(&side, node, "side", alb_side_names, ALB_SIDES, error) ||
+        !alb_node_choice(&target, node, "target", alb_target_names, ALB_TARGETS, error) ||
         !alb_node_object(&pattern, node, "pattern", error) ||
         !alb_node_allow(pattern, "kind diameter_px columns rows pitch_px", error) ||
-        !read_name(&kind, pattern, "kind", alb_pattern_names, ALB_PATTERNS, error) ||
+        !alb_node_choice(&kind, pattern, "kind", alb_pattern_names, ALB_PATTERNS, error) ||
         !alb_node_number(&p->pattern.diameter_px, pattern, "diameter_px", 0, 1e6, error) ||
         !alb_node_integer(&columns, pattern, "columns", 0, 1000, error) ||
         !alb_node_integer(&rows, pattern, "rows", 0, 1000, error) ||

@@ -17,21 +17,6 @@ static const unsigned patterns_on[ALB_TARGETS] = {
     [ALB_TARGET_CAP] = BIT(BLACK),
 };
 
-// The index of the text under `key` among `names`.
-static bool choice(int *out, alb_node object, const char *key, const char *const *names, int count, alb_error *error)
-{
-    const char *text;
-    if (!alb_node_text(&text, object, key, error))
-        return false;
-    for (int i = 0; i < count; i++)
-        if (!strcmp(text, names[i]))
-            return *out = i, true;
-    char known[128] = "";
-    for (int i = 0; i < count; i++)
-        snprintf(known + strlen(known), sizeof known - strlen(known), "%s%s", i ? ", " : "", names[i]);
-    return alb_node_fail(error, object, key, "found \"%.40s\", expected one of %s", text, known);
-}
-
 // Names become file names.
 static bool name(char out[ALB_NAME_SIZE], alb_node object, const char *key, alb_error *error)
 {
@@ -60,7 +45,7 @@ static bool parse_pattern(alb_pattern *pattern, alb_node shot, alb_error *error)
     alb_node node;
     int kind = 0;
     if (!alb_node_object(&node, shot, "pattern", error) ||
-        !choice(&kind, node, "kind", alb_pattern_names, ALB_PATTERNS, error))
+        !alb_node_choice(&kind, node, "kind", alb_pattern_names, ALB_PATTERNS, error))
         return false;
     pattern->kind = (alb_pattern_kind)kind;
     const bool grid = kind == ALB_PATTERN_GRID, disc = grid || kind == ALB_PATTERN_SPOT;
@@ -110,8 +95,8 @@ static bool parse_shot(alb_shot *shot, alb_node object, alb_error *error)
     int side = ALB_REFLECTION, target = 0;
     *shot = (alb_shot){.repeats = 1};
     if (!name(shot->name, object, "name", error) ||
-        (alb_node_has(object, "side") && !choice(&side, object, "side", alb_side_names, ALB_SIDES, error)) ||
-        !choice(&target, object, "target", alb_target_names, ALB_TARGETS, error) ||
+        (alb_node_has(object, "side") && !alb_node_choice(&side, object, "side", alb_side_names, ALB_SIDES, error)) ||
+        !alb_node_choice(&target, object, "target", alb_target_names, ALB_TARGETS, error) ||
         !parse_pattern(&shot->pattern, object, error) || !parse_exposures(shot, object, error) ||
         (alb_node_has(object, "repeats") && !count(&shot->repeats, object, "repeats", 1, 100, error)) ||
         (alb_node_has(object, "in_hand") && !alb_node_boolean(&shot->in_hand, object, "in_hand", error)))

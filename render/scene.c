@@ -3,7 +3,6 @@
 #include "calibrate/calibration.h"
 #include "render/scene_reader.h"
 #include <stdlib.h>
-#include <string.h>
 
 void alb_scene_free(alb_scene *scene)
 {
@@ -81,15 +80,10 @@ static bool read_beam(alb_light *light, alb_node node, alb_error *error)
 
 static bool read_light(alb_light *light, alb_scene_reader *in, alb_node node)
 {
-    const char *kind;
-    int k = 0;
-    if (!alb_node_text(&kind, node, "kind", in->error))
+    int kind;
+    if (!alb_node_choice(&kind, node, "kind", alb_light_names, ALB_LIGHTS, in->error))
         return false;
-    while (k < ALB_LIGHTS && strcmp(kind, alb_light_names[k]))
-        k++;
-    if (k == ALB_LIGHTS)
-        return alb_node_fail(in->error, node, "kind", "'%.40s' is none of point, spot, projector, environment", kind);
-    light->kind = (alb_light_kind)k;
+    light->kind = (alb_light_kind)kind;
     if (light->kind == ALB_LIGHT_ENVIRONMENT)
         return read_environment(light, in, node);
     if (!alb_node_numbers(light->flux, 3, node, "flux", 0, 1e12, in->error))
@@ -121,22 +115,20 @@ static bool read_lights(alb_scene_reader *in, alb_node root)
 
 static bool read_calibrated(alb_scene_reader *in, alb_node node)
 {
-    const char *session, *name;
+    const char *session;
     char folder[ALB_PATH_SIZE], path[ALB_PATH_SIZE];
     int side = 0;
     alb_calibration *calibration = alb_allocate(1, sizeof *calibration, in->error);
     bool ok = calibration && alb_node_allow(node, "calibration side", in->error) &&
               alb_node_text(&session, node, "calibration", in->error) &&
-              alb_node_text(&name, node, "side", in->error) && alb_path_join(folder, in->folder, session, in->error) &&
+              alb_node_choice(&side, node, "side", alb_side_names, ALB_SIDES, in->error) &&
+              alb_path_join(folder, in->folder, session, in->error) &&
               alb_calibration_read(calibration, folder, in->error) &&
               alb_path_join(path, folder, "calibration.json", in->error) &&
               alb_provenance_add(in->provenance, path, in->error);
-    while (ok && side < ALB_SIDES && strcmp(name, alb_side_names[side]))
-        side++;
-    if (ok && side == ALB_SIDES)
-        ok = alb_node_fail(in->error, node, "side", "'%.40s' is neither reflection nor transmission", name);
     if (ok && !calibration->views[side].known)
-        ok = alb_node_fail(in->error, node, "side", "the session has no pose of the camera for %s", name);
+        ok = alb_node_fail(in->error, node, "side", "the session has no pose of the camera for %s",
+                           alb_side_names[side]);
     if (ok)
         in->scene->camera = calibration->views[side].camera;
     free(calibration);

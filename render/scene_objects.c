@@ -89,14 +89,11 @@ static bool read_sphere(alb_mesh *mesh, alb_scene_reader *in, alb_node node)
 
 static bool read_shape(alb_mesh *mesh, alb_scene_reader *in, alb_node node)
 {
-    const char *shape;
-    if (!alb_node_text(&shape, node, "shape", in->error))
+    static const char *const shapes[] = {"box", "sphere"};
+    int shape;
+    if (!alb_node_choice(&shape, node, "shape", shapes, 2, in->error))
         return false;
-    if (!strcmp(shape, "box"))
-        return read_box(mesh, in, node);
-    if (!strcmp(shape, "sphere"))
-        return read_sphere(mesh, in, node);
-    return alb_node_fail(in->error, node, "shape", "'%.40s' is neither box nor sphere", shape);
+    return shape == 0 ? read_box(mesh, in, node) : read_sphere(mesh, in, node);
 }
 
 static bool read_object(alb_scene_reader *in, alb_node node)

@@ -6,12 +6,12 @@
 
 static bool read_slab_path(bool *slab, alb_node node, alb_error *error)
 {
-    const char *path = "solid";
-    if (alb_node_has(node, "path") && !alb_node_text(&path, node, "path", error))
+    static const char *const paths[] = {"solid", "slab"};
+    int path = 0;
+    if (alb_node_has(node, "path") && !alb_node_choice(&path, node, "path", paths, 2, error))
         return false;
-    *slab = !strcmp(path, "slab");
-    return *slab || !strcmp(path, "solid") ||
-           alb_node_fail(error, node, "path", "'%s' is neither slab nor solid", path);
+    *slab = path == 1;
+    return true;
 }
 
 // The profile of a colour channel: by name, or the only one there is.

@@ -52,6 +52,25 @@ static void format_is_required(void **state)
     }
 }
 
+static void choices_are_among_their_names(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"slab", "solid"};
+    alb_error error = {0};
+    alb_record *record = parse("{\"format\": 1, \"a\": \"solid\", \"b\": \"sol\", \"c\": 1}", &error);
+    assert_non_null(record);
+    alb_node root;
+    int chosen = -1;
+    check_ok(alb_record_root(&root, record, &error), &error);
+    check_ok(alb_node_choice(&chosen, root, "a", names, 2, &error), &error);
+    assert_int_equal(chosen, 1);
+    check_fails(alb_node_choice(&chosen, root, "b", names, 2, &error), &error, ALB_BAD_DATA,
+                "a.json:1:29: b: found \"sol\", expected one of slab, solid");
+    check_fails(alb_node_choice(&chosen, root, "c", names, 2, &error), &error, ALB_BAD_DATA, "expected text");
+    assert_int_equal(chosen, 1); // as it was
+    alb_record_free(record);
+}
+
 static void doubles_survive_the_round_trip(void **state)
 {
     (void)state;
@@ -112,6 +131,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(errors_name_line_and_column),
         cmocka_unit_test(format_is_required),
+        cmocka_unit_test(choices_are_among_their_names),
         cmocka_unit_test(doubles_survive_the_round_trip),
         cmocka_unit_test(json_suite),
     };

@@ -53,12 +53,12 @@ static void refuses_what_is_wrong(void **state)
         {"{\"format\":1," BOX ",\"materials\":{\"x\":{\"reflectance\":[0,0,0]}}," CAMERA "}", "no material 'm'"},
         {"{\"format\":1," BOX ",\"materials\":{\"m\":{\"dipole\":{\"absorption_per_mm\":[1,1,1]}}}," CAMERA "}",
          "reduced"},
-        {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"lights\":[{\"kind\":\"lamp\"}]}", "'lamp' is none"},
+        {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"lights\":[{\"kind\":\"lamp\"}]}", "found \"lamp\""},
         {"{\"format\":1," BOX "," WHITE "," CAMERA
          ",\"lights\":[{\"kind\":\"projector\",\"centre_mm\":[0,0,0],\"direction\":[0,0,0],"
          "\"diameter_mm\":1,\"flux\":[1,1,1]}]}",
          "length zero"},
-        {"{\"format\":1,\"objects\":[{\"shape\":\"cone\",\"material\":\"m\"}]," WHITE "," CAMERA "}", "'cone'"},
+        {"{\"format\":1,\"objects\":[{\"shape\":\"cone\",\"material\":\"m\"}]," WHITE "," CAMERA "}", "found \"cone\""},
         {"{\"format\":1,\"objects\":[{\"shape\":\"box\",\"size_mm\":[1,1,1],\"centre_mm\":[0,0,0],\"cells\":[4096,4096,"
          "4096],"
          "\"material\":\"m\"}]," WHITE "," CAMERA "}",
