@@ -5,6 +5,7 @@
 #include "base/progress.h"
 #include "render/solution.h"
 #include "render/view.h"
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,8 +51,19 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// Exposure that shows the 99th percentile of the lit pixels' largest channel at 0.9.
-static bool auto_exposure(double *exposure, const alb_image *picture, alb_error *error)
+// The brightest radiance of what does not emit: lamps and sky may be brighter and are not what a picture is of.
+static double brightest_lit(const alb_solution *s)
+{
+    double brightest = 0;
+    for (size_t p = 0; p < s->patches.count; p++)
+        for (int c = 0; c < 3; c++)
+            if (!(s->exitance[p][0] + s->exitance[p][1] + s->exitance[p][2] > 0))
+                brightest = fmax(brightest, s->radiosity[p][c] / M_PI);
+    return brightest;
+}
+
+// Exposure that shows the 99th percentile of the lit pixels' largest channel at 0.9, lamps and sky left out.
+static bool auto_exposure(double *exposure, const alb_image *picture, double brightest, alb_error *error)
 {
     const size_t pixels = (size_t)picture->width * (size_t)picture->height;
     float *values = alb_allocate(pixels, sizeof *values, error);
@@ -60,7 +72,7 @@ static bool auto_exposure(double *exposure, const alb_image *picture, alb_error 
         return false;
     for (size_t i = 0; i < pixels; i++) {
         const float *p = picture->pixels + 3 * i, value = fmaxf(p[0], fmaxf(p[1], p[2]));
-        if (value > 0)
+        if (value > 0 && (double)value <= 1.001 * brightest)
             values[count++] = value;
     }
     qsort(values, count, sizeof *values, by_size);
@@ -87,15 +99,15 @@ static bool write_mesh(const char *path, const alb_solution *solution, const alb
     return ok;
 }
 
-static bool write_picture(const outputs *out, const alb_image *picture, const alb_provenance *provenance,
-                          double *exposure, alb_error *error)
+static bool write_picture(const outputs *out, const alb_image *picture, double brightest,
+                          const alb_provenance *provenance, double *exposure, alb_error *error)
 {
     char png[ALB_PATH_SIZE];
     alb_json json;
     alb_json_begin(&json, provenance);
     alb_json_end_object(&json);
     const bool ok = (!json.text.failed || alb_fail(error, ALB_NO_MEMORY, "out of memory for the provenance")) &&
-                    png_path(png, out, error) && auto_exposure(exposure, picture, error) &&
+                    png_path(png, out, error) && auto_exposure(exposure, picture, brightest, error) &&
                     alb_exr_write(picture, json.text.bytes, out->picture, error) &&
                     alb_image_write_png(picture, *exposure, png, error);
     alb_json_free(&json);
@@ -193,7 +205,7 @@ static bool render(const outputs *out, alb_scene *scene, alb_provenance *provena
         !alb_view_render(&picture, scene, &solution.tracer, (const float(*)[3][3])corners, error))
         goto done;
     const double view_s = alb_clock_s() - start_s;
-    ok = write_picture(out, &picture, provenance, &exposure, error) &&
+    ok = write_picture(out, &picture, brightest_lit(&solution), provenance, &exposure, error) &&
          (!out->mesh || write_mesh(out->mesh, &solution, provenance, error)) &&
          report(out, scene, &solution, view_s, exposure, error);
 done:
@@ -232,7 +244,7 @@ const alb_command alb_render_command = {
         "alabaster render SCENE.json -o PICTURE.exr [--png PICTURE.png] [--mesh OUT.ply] [--json]\n"
         "\n"
         "Solves B = (I - S F)^-1 (S E + M) on the scene's meshes and writes linear radiance as EXR and, beside it,\n"
-        "a PNG whose exposure shows the brightest hundredth at 0.9.\n"
+        "a PNG whose exposure shows the brightest hundredth of what is lit at 0.9.\n"
         "  -o PICTURE.exr     the picture: channels R, G, B\n"
         "  --png PICTURE.png  where the PNG goes instead of PICTURE.png\n"
         "  --mesh OUT.ply     the mesh with the radiosity of each face (red, green, blue, float)\n"
