@@ -64,7 +64,8 @@ static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
            fitted->identifiable ? "" : "  NOT DECIDED");
     printf("%16s", "");
     for (int p = 0; p < alb_form_parameter_count(fitted->profile.form); p++)
-        printf("%s%c%d %.4g +- %.2g", p ? "  " : "", p % 2 ? 'b' : 'a', p / 2 + 1, fitted->profile.parameters[p], fitted->sd[p]);
+        printf("%s%c%d %.4g +- %.2g", p ? "  " : "", p % 2 ? 'b' : 'a', p / 2 + 1, fitted->profile.parameters[p],
+               fitted->sd[p]);
     printf("\n%16sd ln S / dr %.5g +- %.2g per mm from %.4g to %.4g mm\n", "", outcome->slope_per_mm, outcome->slope_sd,
            outcome->slope_from_mm, outcome->slope_to_mm);
 }
