@@ -38,8 +38,11 @@ bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *erro
 {
     *tracer = (alb_tracer){0};
     RTCDevice device = rtcNewDevice(NULL);
-    if (!device)
-        return alb_fail(error, ALB_INTERNAL, "Embree: cannot start (error %d)", (int)rtcGetDeviceError(NULL));
+    if (!device) {
+        const enum RTCError code = rtcGetDeviceError(NULL);
+        return alb_fail(error, code == RTC_ERROR_OUT_OF_MEMORY ? ALB_NO_MEMORY : ALB_INTERNAL,
+                        "Embree: cannot start (error %d)", (int)code);
+    }
     tracer->device = device;
     rtcSetDeviceMemoryMonitorFunction(device, count_bytes, &tracer->bytes);
     RTCScene scene = rtcNewScene(device);
