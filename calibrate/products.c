@@ -11,12 +11,6 @@
 #include <stdio.h>
 #include <string.h>
 
-static bool same_pattern(const alb_pattern *a, const alb_pattern *b)
-{
-    return a->kind == b->kind && a->diameter_px == b->diameter_px && a->columns == b->columns && a->rows == b->rows &&
-           a->pitch_px == b->pitch_px;
-}
-
 static bool spots(const alb_shot *shot)
 {
     return shot->pattern.kind == ALB_PATTERN_SPOT || shot->pattern.kind == ALB_PATTERN_GRID;
@@ -106,7 +100,7 @@ bool alb_products_make(alb_calibration *calibration, alb_image images[ALB_SHOTS_
         if (shot->target != ALB_TARGET_SLAB || !spots(shot))
             continue;
         int white = 0;
-        while (white < whites && !same_pattern(&calibration->products[white].pattern, &shot->pattern))
+        while (white < whites && !alb_pattern_same(&calibration->products[white].pattern, &shot->pattern))
             white++;
         if (white == whites)
             return alb_fail(error, ALB_BAD_DATA,

@@ -10,14 +10,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double pi = 3.141592653589793;
 enum { POINTS_MOST = 20000 };
-
-static bool inside(const alb_pattern *pattern, int x, int y, int across)
-{
-    const double dx = x - 0.5 * (across - 1), dy = y - 0.5 * (across - 1);
-    return across == 1 || dx * dx + dy * dy <= 0.25 * pattern->diameter_px * pattern->diameter_px;
-}
 
 // Lists a disc's pixels and the points inside them.
 static bool fill_disc(alb_lit_face *face, const alb_pattern *pattern, alb_error *error)
@@ -26,7 +19,7 @@ static bool fill_disc(alb_lit_face *face, const alb_pattern *pattern, alb_error 
     const double p = face->pixel_mm;
     long pixels = 0;
     for (int i = 0; i < across * across; i++)
-        pixels += inside(pattern, i % across, i / across, across);
+        pixels += alb_disc_lights(pattern->diameter_px, i % across, i / across);
     if (!pixels)
         return alb_fail(error, ALB_BAD_DATA,
                         "a disc of diameter_px %g holds the centre of no pixel; 1, or 1.42 and more",
@@ -42,7 +35,7 @@ static bool fill_disc(alb_lit_face *face, const alb_pattern *pattern, alb_error 
     if (!face->pixel || !face->point)
         return false;
     for (int i = 0; i < across * across; i++) {
-        if (!inside(pattern, i % across, i / across, across))
+        if (!alb_disc_lights(pattern->diameter_px, i % across, i / across))
             continue;
         const double x = (i % across - 0.5 * (across - 1)) * p, y = ((double)(i / across) - 0.5 * (across - 1)) * p;
         face->pixel[face->pixel_count][0] = x;
@@ -143,5 +136,5 @@ void alb_lit_face_radiance(double out[3], const void *scene, double x_mm, double
             out[c] = face->reflectance[c] * e;
     }
     for (int c = 0; c < 3; c++)
-        out[c] *= face->irradiance[c] / pi;
+        out[c] *= face->irradiance[c] / M_PI;
 }

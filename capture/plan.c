@@ -1,5 +1,6 @@
 // Reads a plan strictly and refuses what cannot be photographed: every message names the file, line and key.
 #include "capture/plan.h"
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -16,6 +17,19 @@ static const unsigned patterns_on[ALB_TARGETS] = {
     [ALB_TARGET_BOARD] = BIT(CHESSBOARD),
     [ALB_TARGET_CAP] = BIT(BLACK),
 };
+
+bool alb_pattern_same(const alb_pattern *a, const alb_pattern *b)
+{
+    return a->kind == b->kind && a->diameter_px == b->diameter_px && a->columns == b->columns && a->rows == b->rows &&
+           a->pitch_px == b->pitch_px;
+}
+
+bool alb_disc_lights(double diameter_px, int x, int y)
+{
+    const int across = (int)ceil(diameter_px);
+    const double dx = x - 0.5 * (across - 1), dy = y - 0.5 * (across - 1);
+    return across == 1 || dx * dx + dy * dy <= 0.25 * diameter_px * diameter_px;
+}
 
 // Names become file names.
 static bool name(char out[ALB_NAME_SIZE], alb_node object, const char *key, alb_error *error)

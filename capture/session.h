@@ -42,6 +42,12 @@ typedef struct alb_pattern {
     double pitch_px;    // grid
 } alb_pattern;
 
+// Whether two shots project the same light: what pairs the slab with its photograph on the white reference.
+bool alb_pattern_same(const alb_pattern *a, const alb_pattern *b);
+// Whether a disc of the diameter lights pixel (x, y) of the ceil(diameter) pixels across and down about its middle:
+// those whose centre it holds; the one there is, where it is that small.
+bool alb_disc_lights(double diameter_px, int x, int y);
+
 // One line of the plan: a pattern on a target, at several exposures, several times.
 typedef struct alb_shot {
     char name[ALB_NAME_SIZE]; // [a-z0-9_]+, unique

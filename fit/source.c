@@ -124,19 +124,22 @@ static bool read_product(alb_image *image, alb_provenance *provenance, const alb
     return true;
 }
 
-// The spot on the white reference with the pattern of the slab's shot.
-static bool measure_spots(alb_spot spots[3], alb_provenance *provenance, const alb_calibration *calibration,
-                          const alb_pattern *pattern, alb_error *error)
+// The spot on the white reference, as it lights the slab: measured once for all sides that it serves.
+typedef struct white_spot {
+    const alb_product *product;
+    alb_spot spots[3];
+} white_spot;
+
+static void white_spot_free(white_spot *white)
 {
-    const alb_product *white = NULL;
-    for (int i = 0; i < calibration->product_count && !white; i++)
-        if (calibration->products[i].target == ALB_TARGET_WHITE &&
-            calibration->products[i].pattern.kind == ALB_PATTERN_SPOT &&
-            calibration->products[i].pattern.diameter_px == pattern->diameter_px)
-            white = &calibration->products[i];
-    if (!white)
-        return alb_fail(error, ALB_BAD_DATA, "%s: no shot of a spot of %g projector pixels on the white reference",
-                        calibration->folder, pattern->diameter_px);
+    for (int c = 0; c < 3; c++)
+        alb_spot_free(&white->spots[c]);
+    *white = (white_spot){0};
+}
+
+static bool measure_spots(alb_spot spots[3], alb_provenance *provenance, const alb_calibration *calibration,
+                          const alb_product *white, alb_error *error)
+{
     alb_image image = {0};
     alb_face face = {0};
     bool ok = read_product(&image, provenance, calibration, white, error) &&
@@ -161,6 +164,23 @@ static bool measure_spots(alb_spot spots[3], alb_provenance *provenance, const a
     return ok;
 }
 
+// Makes `white` the spot with the pattern of the slab's shot.
+static bool white_spot_for(white_spot *white, alb_provenance *provenance, const alb_calibration *calibration,
+                           const alb_pattern *pattern, alb_error *error)
+{
+    if (white->product && alb_pattern_same(&white->product->pattern, pattern))
+        return true;
+    white_spot_free(white);
+    for (int i = 0; i < calibration->product_count; i++)
+        if (calibration->products[i].target == ALB_TARGET_WHITE &&
+            alb_pattern_same(&calibration->products[i].pattern, pattern)) {
+            white->product = &calibration->products[i];
+            return measure_spots(white->spots, provenance, calibration, white->product, error);
+        }
+    return alb_fail(error, ALB_BAD_DATA, "%s: no shot of a spot of %g projector pixels on the white reference",
+                    calibration->folder, pattern->diameter_px);
+}
+
 static void note_view(alb_text *notes, const alb_calibration *calibration, alb_side side)
 {
     const alb_transform world_from_camera = alb_inverse(&calibration->views[side].camera.camera_from_world);
@@ -174,17 +194,17 @@ static void note_view(alb_text *notes, const alb_calibration *calibration, alb_s
             alb_side_names[side], angle_deg);
 }
 
-static bool observe_product(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
+static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provenance *provenance, alb_text *notes,
                             const alb_calibration *calibration, const alb_product *product, alb_error *error)
 {
     alb_image image = {0};
     alb_face face = {0};
-    alb_spot spots[3] = {{0}};
     note_view(notes, calibration, product->side);
     bool ok = read_product(&image, provenance, calibration, product, error) &&
               alb_face_seen(&face, &calibration->views[product->side].camera, error) &&
-              measure_spots(spots, provenance, calibration, &product->pattern, error);
+              white_spot_for(white, provenance, calibration, &product->pattern, error);
     if (ok) {
+        const alb_spot *spots = white->spots;
         const photo seen = {product->shot, product->side, &image, &face, {&spots[0], &spots[1], &spots[2]},
                             M_PI,          INFINITY};
         for (int c = 0; c < calibration->channels; c++)
@@ -192,8 +212,6 @@ static bool observe_product(alb_fitting *fitting, alb_provenance *provenance, al
                 (alb_common_sd){product->relative_scale_sd[c], calibration->views[product->side].relative_length_sd};
         ok = observe_channels(fitting, &seen, notes, error);
     }
-    for (int c = 0; c < 3; c++)
-        alb_spot_free(&spots[c]);
     alb_face_free(&face);
     alb_image_free(&image);
     return ok;
@@ -203,21 +221,22 @@ static bool observe_product(alb_fitting *fitting, alb_provenance *provenance, al
 static bool observe_products(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
                              const alb_calibration *calibration, alb_error *error)
 {
-    bool taken[ALB_SIDES] = {false};
-    for (int i = 0; i < calibration->product_count; i++) {
+    bool taken[ALB_SIDES] = {false}, ok = true;
+    white_spot white = {0};
+    for (int i = 0; ok && i < calibration->product_count; i++) {
         const alb_product *product = &calibration->products[i];
         if (product->target != ALB_TARGET_SLAB || product->pattern.kind != ALB_PATTERN_SPOT)
             continue;
         if (taken[product->side])
-            return alb_fail(error, ALB_BAD_DATA,
-                            "%s: more than one shot of a spot on the slab in %s; a material has one",
-                            calibration->folder, alb_side_names[product->side]);
+            ok = alb_fail(error, ALB_BAD_DATA, "%s: more than one shot of a spot on the slab in %s; a material has one",
+                          calibration->folder, alb_side_names[product->side]);
         taken[product->side] = true;
-        if (!observe_product(fitting, provenance, notes, calibration, product, error))
-            return false;
+        ok = ok && observe_product(fitting, &white, provenance, notes, calibration, product, error);
     }
-    return taken[ALB_REFLECTION] || taken[ALB_TRANSMISSION] ||
-           alb_fail(error, ALB_BAD_DATA, "%s: no shot of a spot on the slab", calibration->folder);
+    white_spot_free(&white);
+    if (ok && !taken[ALB_REFLECTION] && !taken[ALB_TRANSMISSION])
+        return alb_fail(error, ALB_BAD_DATA, "%s: no shot of a spot on the slab", calibration->folder);
+    return ok;
 }
 
 bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes, const char *folder,

@@ -8,6 +8,7 @@
 #include "render/light.h"
 #include "base/memory.h"
 #include "base/random.h"
+#include "capture/session.h"
 #include <stdlib.h>
 
 enum { POINTS = 4, RAYS = 1 << 20 }; // POINTS^2 on a patch
@@ -113,7 +114,7 @@ static bool beam_create(beam *out, const alb_light *light, const alb_patches *pa
         return false;
     for (int k = 0; k < across * across; k++) {
         const double x = k % across - 0.5 * (across - 1), y = (double)(k / across) - 0.5 * (across - 1);
-        if (across > 1 && x * x + y * y > 0.25 * light->diameter_px * light->diameter_px)
+        if (across > 1 && !alb_disc_lights(light->diameter_px, k % across, k / across))
             continue;
         out->pixels[out->pixel_count][0] = x * light->pixel_mm;
         out->pixels[out->pixel_count++][1] = y * light->pixel_mm;
