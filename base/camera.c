@@ -95,7 +95,7 @@ alb_camera alb_camera_look_at(alb_vector position, alb_vector target, alb_vector
         x = alb_cross(z, fabs(z.y) < 0.9 ? (alb_vector){0, 1, 0} : (alb_vector){1, 0, 0});
     x = alb_unit(x);
     const alb_vector y = alb_cross(z, x);
-    const double f = 0.5 * height / tan(vertical_field_deg * 3.141592653589793 / 360);
+    const double f = 0.5 * height / tan(vertical_field_deg * M_PI / 360);
     alb_camera camera = {
         .lens = {.width = width, .height = height, .fx = f, .fy = f, .cx = 0.5 * (width - 1), .cy = 0.5 * (height - 1)},
         .camera_from_world = {.rotation = {{x.x, x.y, x.z}, {y.x, y.y, y.z}, {z.x, z.y, z.z}}}};

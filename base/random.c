@@ -23,7 +23,7 @@ alb_random alb_random_at(uint64_t seed, uint64_t stream, uint64_t index)
 double alb_random_normal(alb_random *random)
 {
     const double u = 1 - alb_random_uniform(random), v = alb_random_uniform(random);
-    return sqrt(-2 * log(u)) * cos(6.283185307179586 * v);
+    return sqrt(-2 * log(u)) * cos(2 * M_PI * v);
 }
 
 // Hormann 1993, "The transformed rejection method for generating Poisson random variables", algorithm PTRS.

@@ -12,7 +12,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double pi = 3.141592653589793;
 enum { PARTS_OF_SD = 16, REACH_SD = 7 }; // e^(-7^2/2) = 2e-11
 
 typedef struct thin_rings {
@@ -50,7 +49,7 @@ static double profile_disc(const alb_stated_profile *profile, double r)
     double sum = 0;
     for (int i = 0; i < profile->terms; i++) {
         const double b = profile->decay_per_mm[i], x = b * r;
-        sum += 2 * pi * profile->amplitude_per_mm2[i] / (b * b) * (-expm1(-x) - x * exp(-x));
+        sum += 2 * M_PI * profile->amplitude_per_mm2[i] / (b * b) * (-expm1(-x) - x * exp(-x));
     }
     return sum;
 }
@@ -63,7 +62,7 @@ void alb_response_from_profile(alb_response *response, const alb_stated_profile 
         const double outer = radius_mm * ((i + 1) / bins) * ((i + 1) / bins);
         response->r_mm[i] = mean_radius(inner, outer);
         response->value_per_mm2[i] =
-            (profile_disc(profile, outer) - profile_disc(profile, inner)) / (pi * (outer * outer - inner * inner));
+            (profile_disc(profile, outer) - profile_disc(profile, inner)) / (M_PI * (outer * outer - inner * inner));
     }
 }
 
@@ -72,7 +71,7 @@ void alb_response_from_photons(alb_response *response, const alb_photon_tally *t
     *response = (alb_response){.total = tally->leaving[face], .total_sd = tally->leaving_sd[face]};
     for (int i = 0; i < ALB_PHOTON_BINS; i++) {
         const double inner = tally->edges_mm[i], outer = tally->edges_mm[i + 1];
-        const double area = pi * (outer * outer - inner * inner);
+        const double area = M_PI * (outer * outer - inner * inner);
         response->r_mm[i] = mean_radius(inner, outer);
         response->value_per_mm2[i] = tally->ring[face][i] / area;
         response->sd_per_mm2[i] = tally->ring_sd[face][i] / area;
@@ -115,7 +114,7 @@ static bool rings_from_photons(thin_rings *out, const alb_photon_tally *tally, i
         for (size_t j = 0; j < parts[i]; j++) {
             const double a = inner + (double)j * thin, b = a + thin, r = mean_radius(a, b);
             out->radius[at + j] = r;
-            sum += out->mass[at + j] = between_means(&means, r) * pi * (b * b - a * a);
+            sum += out->mass[at + j] = between_means(&means, r) * M_PI * (b * b - a * a);
         }
         for (size_t j = 0; j < parts[i] && sum > 0; j++)
             out->mass[at + j] *= tally->ring[face][i] / sum;
@@ -160,7 +159,7 @@ static bool blur(alb_kernel *kernel, const thin_rings *rings, double sd, double 
             if (rings->mass[i] != 0)
                 sum += rings->mass[i] * exp(-0.5 * d * d) * bessel_i0e(r * rings->radius[i] / (sd * sd));
         }
-        kernel->value_per_mm2[j] = sum / (2 * pi * sd * sd);
+        kernel->value_per_mm2[j] = sum / (2 * M_PI * sd * sd);
     }
     return true;
 }

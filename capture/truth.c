@@ -59,7 +59,7 @@ static bool parse_profile(alb_stated_profile profile[3], alb_node sides, const c
             if (!alb_node_item_number(amplitude, a, (size_t)i, -1e6, 1e6, error) ||
                 !alb_node_item_number(decay, b, (size_t)i, 1e-3, 1e4, error))
                 return false;
-            total += 2 * 3.141592653589793 * *amplitude / (*decay * *decay);
+            total += 2 * M_PI * *amplitude / (*decay * *decay);
         }
         if (!(total >= 0 && total <= 1))
             return alb_node_fail(error, node, NULL, "channel %s sheds %.4g of the light it gets; expected 0 to 1",

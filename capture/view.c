@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double degree = 3.141592653589793 / 180;
+static const double degree = M_PI / 180;
 
 bool alb_sight_open(alb_sight *sight, const alb_truth *truth, alb_error *error)
 {
