@@ -13,6 +13,8 @@ typedef struct reader {
     exr_decode_pipeline_t decoder;
     bool decoding;
     const char *path;
+    const char *bytes; // reading: the whole file
+    size_t size;
     char problem[256]; // the library's latest message
 } reader;
 
@@ -140,19 +142,38 @@ static bool read_tiles(alb_image *image, reader *r, alb_error *error)
     return true;
 }
 
-bool alb_exr_read(alb_image *image, const char *path, alb_error *error)
+static int64_t size_of(exr_const_context_t context, void *user)
+{
+    (void)context;
+    return (int64_t)((const reader *)user)->size;
+}
+
+// As pread: fewer bytes than asked for at the end.
+static int64_t read_at(exr_const_context_t context, void *user, void *buffer, uint64_t size, uint64_t offset,
+                       exr_stream_error_func_ptr_t fail)
+{
+    (void)context, (void)fail;
+    const reader *r = user;
+    const uint64_t left = offset < r->size ? r->size - offset : 0, count = size < left ? size : left;
+    if (count)
+        memcpy(buffer, r->bytes + offset, count);
+    return (int64_t)count;
+}
+
+bool alb_exr_decode(alb_image *image, const void *bytes, size_t size, const char *name, alb_error *error)
 {
     *image = (alb_image){0};
-    reader r = {.path = path};
+    reader r = {.path = name, .bytes = bytes, .size = size};
     exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
     options.error_handler_fn = keep_message;
+    options.user_data = &r;
+    options.size_fn = size_of;
+    options.read_fn = read_at;
     options.max_image_width = options.max_image_height = 1 << 20;
     options.max_tile_width = options.max_tile_height = 1 << 14;
-    if (!alb_file_exists(path))
-        return alb_fail(error, ALB_ACCESS, "%s: no such file", path);
     bool ok = false;
     current = &r;
-    const exr_result_t code = exr_start_read(&r.context, path, &options);
+    const exr_result_t code = exr_start_read(&r.context, name, &options);
     if (code) {
         damaged(&r, code, error);
         goto done;
@@ -172,6 +193,16 @@ done:
     current = NULL;
     if (!ok)
         alb_image_free(image);
+    return ok;
+}
+
+bool alb_exr_read(alb_image *image, const char *path, alb_error *error)
+{
+    char *bytes = NULL;
+    size_t size = 0;
+    *image = (alb_image){0};
+    const bool ok = alb_file_read(&bytes, &size, path, error) && alb_exr_decode(image, bytes, size, path, error);
+    free(bytes);
     return ok;
 }
 

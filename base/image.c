@@ -54,7 +54,7 @@ bool alb_image_read(alb_image *image, int *bits, const char *path, alb_error *er
     if (size == 0)
         ok = alb_fail(error, ALB_BAD_DATA, "%s: the file is empty, expected an image", path);
     else if (alb_exr_is(bytes, size))
-        ok = alb_exr_read(image, path, error);
+        ok = alb_exr_decode(image, bytes, size, path, error);
     else
         ok = alb_vision_decode(image, &depth, bytes, size, path, error);
     free(bytes);
