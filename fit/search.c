@@ -22,100 +22,13 @@ int alb_candidate_parameters(alb_candidate candidate)
     return alb_form_parameter_count(candidate.form) - candidate.tied;
 }
 
-double alb_energy(const alb_readings *readings, const double *value)
-{
-    double sum = 0;
-    for (int i = 0; i < readings->count; i++)
-        sum += readings->area_mm2[i] * value[i];
-    return sum;
-}
-
-int alb_weighing_rows(const alb_weighing *weighing) { return weighing->readings->count + (weighing->energy_sd > 0); }
-
-double alb_weighing_reading(const alb_weighing *weighing, int i)
-{
-    return i < weighing->readings->count
-               ? weighing->readings->value[i] / weighing->sd[i]
-               : alb_energy(weighing->readings, weighing->readings->value) / weighing->energy_sd;
-}
-
-// Whitened model and its derivatives by the form's own parameters: values[0] the model, values[1 + p] the derivatives.
-// All come from the readings of e^(-b r) and r e^(-b r) of the terms: two columns of the operator each, one application
-// for two terms, a second for the third.
-enum { BLOCKS = (PARAMETERS + ALB_OPERATOR_COLUMNS - 1) / ALB_OPERATOR_COLUMNS };
-
-typedef struct model {
-    const alb_weighing *weighing;
+// One problem of the solver.
+typedef struct search {
     alb_candidate candidate;
-    bool known; // the values are those of `at`
+    alb_model model;
+    bool known; // the model's values are those of `at`
     double at[PARAMETERS];
-    double (*on_grid)[ALB_OPERATOR_COLUMNS], (*columns[BLOCKS])[ALB_OPERATOR_COLUMNS];
-    double *values[1 + PARAMETERS];
-} model;
-
-static void model_free(model *m)
-{
-    free(m->on_grid);
-    free(m->columns[0]);
-    free(m->values[0]);
-    *m = (model){0};
-}
-
-static bool model_create(model *out, alb_candidate candidate, const alb_weighing *weighing, alb_error *error)
-{
-    const size_t grid = (size_t)weighing->forward->grid_count, rows = (size_t)weighing->readings->count + 1;
-    *out = (model){.weighing = weighing, .candidate = candidate};
-    if (!(out->on_grid = alb_allocate(grid, sizeof *out->on_grid, error)) ||
-        !(out->columns[0] = alb_allocate(BLOCKS * rows, sizeof *out->columns[0], error)) ||
-        !(out->values[0] = alb_allocate((1 + PARAMETERS) * rows, sizeof(double), error))) {
-        model_free(out);
-        return false;
-    }
-    for (int block = 1; block < BLOCKS; block++)
-        out->columns[block] = out->columns[block - 1] + rows;
-    for (int p = 1; p <= PARAMETERS; p++)
-        out->values[p] = out->values[p - 1] + rows;
-    return true;
-}
-
-// Readings of e^(-b r) and r e^(-b r) of the terms from parameter `from` on, as many as go together.
-static void apply_terms(model *m, const double *p, int from, int parameters)
-{
-    const alb_operator *forward = m->weighing->forward;
-    const int together = parameters - from < ALB_OPERATOR_COLUMNS ? parameters - from : ALB_OPERATOR_COLUMNS;
-    for (int k = 0; k < forward->grid_count; k++)
-        for (int t = 0; t < together; t += 2) {
-            const double e = exp(-p[from + t + 1] * forward->grid_mm[k]);
-            m->on_grid[k][t] = e;
-            m->on_grid[k][t + 1] = forward->grid_mm[k] * e;
-        }
-    alb_operator_apply(m->columns[from / ALB_OPERATOR_COLUMNS], forward,
-                       (const double(*)[ALB_OPERATOR_COLUMNS])m->on_grid);
-}
-
-static void model_evaluate(model *m, const alb_profile *profile)
-{
-    const alb_readings *readings = m->weighing->readings;
-    const int n = readings->count, parameters = alb_form_parameter_count(profile->form);
-    const double *p = profile->parameters;
-    for (int from = 0; from < parameters; from += ALB_OPERATOR_COLUMNS)
-        apply_terms(m, p, from, parameters);
-    for (int i = 0; i < n; i++) {
-        m->values[0][i] = 0;
-        for (int t = 0; t < parameters; t += 2) {
-            const double *column = m->columns[t / ALB_OPERATOR_COLUMNS][i] + t % ALB_OPERATOR_COLUMNS;
-            m->values[0][i] += p[t] * column[0];
-            m->values[1 + t][i] = column[0];
-            m->values[2 + t][i] = -p[t] * column[1];
-        }
-    }
-    for (int q = 0; q <= parameters; q++) {
-        double *values = m->values[q];
-        values[n] = m->weighing->energy_sd > 0 ? alb_energy(readings, values) / m->weighing->energy_sd : 0;
-        for (int i = 0; i < n; i++)
-            values[i] /= m->weighing->sd[i];
-    }
-}
+} search;
 
 // The form's parameters from the solver's, and the derivatives d form[i] / d solver[j].
 static alb_profile profile_of(double jacobian[PARAMETERS][PARAMETERS], alb_candidate candidate, const double *u)
@@ -150,23 +63,24 @@ static void solver_of(double *u, const alb_profile *profile)
 
 static void evaluate(double *residuals, double *jacobian, const double *u, const void *context)
 {
-    model *m = (model *)context;
+    search *s = (search *)context;
+    const alb_weighing *weighing = s->model.weighing;
     double chain[PARAMETERS][PARAMETERS];
-    const alb_profile profile = profile_of(chain, m->candidate, u);
-    const int all = alb_form_parameter_count(m->candidate.form), rows = alb_weighing_rows(m->weighing);
-    const int free_parameters = alb_candidate_parameters(m->candidate);
+    const alb_profile profile = profile_of(chain, s->candidate, u);
+    const int all = alb_form_parameter_count(s->candidate.form), rows = alb_weighing_rows(weighing);
+    const int free_parameters = alb_candidate_parameters(s->candidate);
     const size_t size = (size_t)free_parameters * sizeof *u;
-    if (!m->known ||
-        memcmp(m->at, u, size) != 0) // the solver asks for the residuals first, then for the Jacobian there
-        model_evaluate(m, &profile);
-    m->known = true;
-    memcpy(m->at, u, size);
+    // the solver asks for the residuals first, then for the Jacobian there
+    if (!s->known || memcmp(s->at, u, size) != 0)
+        alb_model_evaluate(&s->model, &profile);
+    s->known = true;
+    memcpy(s->at, u, size);
     for (int i = 0; i < rows; i++) {
-        residuals[i] = m->values[0][i] - alb_weighing_reading(m->weighing, i);
+        residuals[i] = s->model.values[0][i] - alb_weighing_reading(weighing, i);
         for (int q = 0; jacobian && q < free_parameters; q++) {
             double sum = 0;
             for (int p = 0; p < all; p++)
-                sum += m->values[1 + p][i] * chain[p][q];
+                sum += s->model.values[1 + p][i] * chain[p][q];
             jacobian[i * free_parameters + q] = sum;
         }
     }
@@ -189,8 +103,8 @@ static void order_terms(alb_profile *profile)
 bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate candidate, const alb_weighing *weighing,
                        alb_error *error)
 {
-    model m;
-    if (!model_create(&m, candidate, weighing, error))
+    search s = {.candidate = candidate};
+    if (!alb_model_create(&s.model, weighing, error))
         return false;
     double top = 0, u[PARAMETERS], lower[PARAMETERS], upper[PARAMETERS], chain[PARAMETERS][PARAMETERS];
     for (int i = 0; i < weighing->readings->count; i++)
@@ -209,11 +123,11 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate c
     const int parameters = alb_candidate_parameters(candidate);
     for (int p = 0; p < parameters; p++)
         u[p] = fmin(fmax(u[p], lower[p]), upper[p]);
-    const alb_problem problem = {parameters, alb_weighing_rows(weighing), evaluate, &m, lower, upper};
+    const alb_problem problem = {parameters, alb_weighing_rows(weighing), evaluate, &s, lower, upper};
     const bool ok = alb_solve(u, chi_square, &problem, error);
     *profile = profile_of(chain, candidate, u);
     order_terms(profile);
-    model_free(&m);
+    alb_model_free(&s.model);
     return ok;
 }
 
@@ -278,10 +192,10 @@ bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_
                            const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing,
                            alb_error *error)
 {
-    model m;
-    if (!model_create(&m, candidate, weighing, error))
+    alb_model m;
+    if (!alb_model_create(&m, weighing, error))
         return false;
-    model_evaluate(&m, profile);
+    alb_model_evaluate(&m, profile);
     const int all = alb_form_parameter_count(profile->form), n = alb_candidate_parameters(candidate);
     const int rows = alb_weighing_rows(weighing);
     // own[p][q]: derivative of the form's parameter p by the free parameter q (a1, b1, a2, and b2 where it is free)
@@ -299,7 +213,7 @@ bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_
             for (int q = 0; q < n; q++)
                 matrix[p][q] += row[p] * row[q];
     }
-    model_free(&m);
+    alb_model_free(&m);
     *full_rank = true;
     for (int p = 0; p < n; p++) {
         scale[p] = sqrt(matrix[p][p]);

@@ -1,19 +1,6 @@
 // The best parameters of one form, from no start values.
 #pragma once
-#include "fit/operator.h"
-#include "fit/profile.h"
-
-// What a fit sees. Borrowed.
-typedef struct alb_weighing {
-    const alb_readings *readings;
-    const alb_operator *forward;
-    const double *sd; // of each reading
-    double energy_sd; // of sum value * area; 0: the energy is not a reading of its own
-} alb_weighing;
-
-// Whitened readings, the energy behind them where it has an sd: how many, and which they are.
-int alb_weighing_rows(const alb_weighing *weighing);
-double alb_weighing_reading(const alb_weighing *weighing, int i);
+#include "fit/model.h"
 
 // A form as it is fitted. Tied: signed exponentials with b2 = ALB_TIED_RATIO b1, three parameters. As b2 comes close to
 // b1 the pair tends to (A + B r) e^(-b r) and its amplitudes grow without bound while S stays: the tied pair stands for
@@ -48,5 +35,3 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate c
 bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX], bool *full_rank,
                            const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing,
                            alb_error *error);
-// sum value * area, of any readings.
-double alb_energy(const alb_readings *readings, const double *value);
