@@ -20,7 +20,7 @@ typedef enum alb_medium_source {
 
 typedef struct alb_appearance_channel {
     alb_burley burley;
-    double albedo_sd;
+    double albedo_sd; // NaN where the data do not decide
     // ln(Burley / measured) over the middle 90 % of the light that leaves: rms, and largest
     double deviation_rms, deviation_maximum;
     double absorption_per_mm, reduced_scattering_per_mm;

@@ -61,8 +61,10 @@ static void put_channel(alb_text *text, const alb_export *exported, int c, const
     const char *name = exported->material->channel_names[c];
     const double albedo =
         channel->reduced_scattering_per_mm / (channel->absorption_per_mm + channel->reduced_scattering_per_mm);
-    alb_text_add(text, "%s%s: reflects %.6g +- %.2g of the light, fitted by %s%s.\n", prefix, name,
-                 channel->burley.albedo, channel->albedo_sd, alb_form_name(reflection->profile.form),
+    alb_text_add(text, "%s%s: reflects %.6g", prefix, name, channel->burley.albedo);
+    if (reflection->identifiable)
+        alb_text_add(text, " +- %.2g", channel->albedo_sd);
+    alb_text_add(text, " of the light, fitted by %s%s.\n", alb_form_name(reflection->profile.form),
                  reflection->identifiable ? "" : ": a best guess, the data do not decide");
     alb_text_add(text,
                  "%s%s: Burley's profile of length d = %.6g mm misses that by %.2g %% rms, %.2g %% at most, where "
