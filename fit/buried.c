@@ -13,11 +13,14 @@
 #include "fit/form.h"
 #include <math.h>
 
-// Parameters a, b and, where `stride` is 3, z of each term.
-static double sources_value(double *gradient, const double *p, int terms, int stride, double r_mm)
+// Parameters of a term: a, b and, where there are three, z.
+static int stride_of(const alb_form_row *row) { return row->parameter_count / row->term_count; }
+
+static double sources_value(double *gradient, const alb_form_row *row, const double *p, double r_mm)
 {
+    const int stride = stride_of(row);
     double sum = 0;
-    for (int j = 0; j < terms; j++, p += stride) {
+    for (int j = 0; j < row->term_count; j++, p += stride) {
         const double z = stride == 3 ? p[2] : 0, rho = sqrt(r_mm * r_mm + z * z);
         const double further = rho > 0 ? r_mm * r_mm / (rho + z) : 0, unit = exp(-p[1] * further) / rho;
         sum += p[0] * unit;
@@ -32,10 +35,11 @@ static double sources_value(double *gradient, const double *p, int terms, int st
     return sum;
 }
 
-static double sources_total(double *gradient, const double *p, int terms, int stride)
+static double sources_total(double *gradient, const alb_form_row *row, const double *p)
 {
+    const int stride = stride_of(row);
     double sum = 0;
-    for (int j = 0; j < terms; j++, p += stride) {
+    for (int j = 0; j < row->term_count; j++, p += stride) {
         sum += 2 * M_PI * p[0] / p[1];
         if (!gradient)
             continue;
@@ -48,10 +52,11 @@ static double sources_total(double *gradient, const double *p, int terms, int st
     return sum;
 }
 
-static double sources_disc(const double *p, int terms, int stride, double rho_mm)
+static double sources_disc(const alb_form_row *row, const double *p, double rho_mm)
 {
+    const int stride = stride_of(row);
     double sum = 0;
-    for (int j = 0; j < terms; j++, p += stride) {
+    for (int j = 0; j < row->term_count; j++, p += stride) {
         const double z = stride == 3 ? p[2] : 0;
         const double further = rho_mm > 0 ? rho_mm * rho_mm / (sqrt(rho_mm * rho_mm + z * z) + z) : 0;
         sum += -p[0] * expm1(-p[1] * further) / p[1];
@@ -59,10 +64,17 @@ static double sources_disc(const double *p, int terms, int stride, double rho_mm
     return sum;
 }
 
-static bool sources_sound(const double *p, int terms, int stride)
+static double sources_slowest(const alb_form_row *row, const double *p)
 {
+    (void)row;
+    return p[1];
+}
+
+static bool sources_sound(const alb_form_row *row, const double *p)
+{
+    const int stride = stride_of(row);
     double before = 0;
-    for (int j = 0; j < terms; j++, p += stride) {
+    for (int j = 0; j < row->term_count; j++, p += stride) {
         if (!(p[0] > 0 && p[1] > before && (stride == 2 || p[2] > 0)))
             return false;
         before = p[1];
@@ -70,34 +82,9 @@ static bool sources_sound(const double *p, int terms, int stride)
     return true;
 }
 
-static double first_decay(const double *p, int terms)
+static double burley_value(double *gradient, const alb_form_row *row, const double *p, double r_mm)
 {
-    (void)terms;
-    return p[1];
-}
-
-static double over_value(double *gradient, const double *p, int terms, double r_mm)
-{
-    return sources_value(gradient, p, terms, 2, r_mm);
-}
-static double over_total(double *gradient, const double *p, int terms) { return sources_total(gradient, p, terms, 2); }
-static double over_disc(const double *p, int terms, double rho_mm) { return sources_disc(p, terms, 2, rho_mm); }
-static bool over_sound(const double *p, int terms) { return sources_sound(p, terms, 2); }
-
-static double buried_value(double *gradient, const double *p, int terms, double r_mm)
-{
-    return sources_value(gradient, p, terms, 3, r_mm);
-}
-static double buried_total(double *gradient, const double *p, int terms)
-{
-    return sources_total(gradient, p, terms, 3);
-}
-static double buried_disc(const double *p, int terms, double rho_mm) { return sources_disc(p, terms, 3, rho_mm); }
-static bool buried_sound(const double *p, int terms) { return sources_sound(p, terms, 3); }
-
-static double burley_value(double *gradient, const double *p, int terms, double r_mm)
-{
-    (void)terms;
+    (void)row;
     const double d = p[1], near = exp(-r_mm / d), far = exp(-r_mm / (3 * d)), unit = 1 / (8 * M_PI * d * r_mm);
     if (gradient) {
         gradient[0] = unit * (near + far);
@@ -106,75 +93,61 @@ static double burley_value(double *gradient, const double *p, int terms, double 
     return p[0] * unit * (near + far);
 }
 
-static double burley_total(double *gradient, const double *p, int terms)
+static double burley_total(double *gradient, const alb_form_row *row, const double *p)
 {
-    (void)terms;
+    (void)row;
     if (gradient)
         gradient[0] = 1, gradient[1] = 0;
     return p[0];
 }
 
-static double burley_disc(const double *p, int terms, double rho_mm)
+static double burley_disc(const alb_form_row *row, const double *p, double rho_mm)
 {
-    (void)terms;
+    (void)row;
     return p[0] / (2 * M_PI) * (-0.25 * expm1(-rho_mm / p[1]) - 0.75 * expm1(-rho_mm / (3 * p[1])));
 }
 
-static double burley_slowest(const double *p, int terms)
+static double burley_slowest(const alb_form_row *row, const double *p)
 {
-    (void)terms;
+    (void)row;
     return 1 / (3 * p[1]);
 }
 
-static bool burley_sound(const double *p, int terms)
+static bool burley_sound(const alb_form_row *row, const double *p)
 {
-    (void)terms;
+    (void)row;
     return p[0] > 0 && p[1] > 0;
 }
 
-#define SOURCES_OVER_R                                                                                                 \
-    .value = over_value, .total = over_total, .disc = over_disc, .slowest = first_decay, .sound = over_sound
-#define SOURCES_BURIED                                                                                                 \
-    .value = buried_value, .total = buried_total, .disc = buried_disc, .slowest = first_decay, .sound = buried_sound
+#define SOURCE(n)                                                                                                      \
+    {"amplitude_" #n "_per_mm", 1, -1}, { "decay_" #n "_per_mm", 0, -1 }
+#define SOURCES                                                                                                        \
+    .value = sources_value, .total = sources_total, .disc = sources_disc, .slowest = sources_slowest,                  \
+    .sound = sources_sound
 
-const alb_form_row alb_two_exponentials_over_r_row = {
-    .name = "two_exponentials_over_r",
-    .parameter_count = 4,
-    .term_count = 2,
-    .singular = true,
-    .parameters = {{"amplitude_1_per_mm", 1, -1},
-                   {"decay_1_per_mm", 0, -1},
-                   {"amplitude_2_per_mm", 1, -1},
-                   {"decay_2_per_mm", 0, -1}},
-    SOURCES_OVER_R,
-};
-const alb_form_row alb_buried_source_row = {
-    .name = "buried_source",
-    .parameter_count = 3,
-    .term_count = 1,
-    .parameters = {{"amplitude_1_per_mm", 1, -1}, {"decay_1_per_mm", 0, -1}, {"depth_1_mm", 0, 1}},
-    SOURCES_BURIED,
-};
+const alb_form_row alb_two_over_r_row = {.name = "two_exponentials_over_r",
+                                         .parameter_count = 4,
+                                         .term_count = 2,
+                                         .singular = true,
+                                         .parameters = {SOURCE(1), SOURCE(2)},
+                                         SOURCES};
+const alb_form_row alb_buried_source_row = {.name = "buried_source",
+                                            .parameter_count = 3,
+                                            .term_count = 1,
+                                            .parameters = {SOURCE(1), {"depth_1_mm", 0, 1}},
+                                            SOURCES};
 const alb_form_row alb_two_buried_sources_row = {
     .name = "two_buried_sources",
     .parameter_count = 6,
     .term_count = 2,
-    .parameters = {{"amplitude_1_per_mm", 1, -1},
-                   {"decay_1_per_mm", 0, -1},
-                   {"depth_1_mm", 0, 1},
-                   {"amplitude_2_per_mm", 1, -1},
-                   {"decay_2_per_mm", 0, -1},
-                   {"depth_2_mm", 0, 1}},
-    SOURCES_BURIED,
-};
-const alb_form_row alb_burley_row = {
-    .name = "burley",
-    .parameter_count = 2,
-    .singular = true,
-    .parameters = {{"albedo", 1, 0}, {"length_mm", 0, 1}},
-    .value = burley_value,
-    .total = burley_total,
-    .disc = burley_disc,
-    .slowest = burley_slowest,
-    .sound = burley_sound,
-};
+    .parameters = {SOURCE(1), {"depth_1_mm", 0, 1}, SOURCE(2), {"depth_2_mm", 0, 1}},
+    SOURCES};
+const alb_form_row alb_burley_row = {.name = "burley",
+                                     .parameter_count = 2,
+                                     .singular = true,
+                                     .parameters = {{"albedo", 1, 0}, {"length_mm", 0, 1}},
+                                     .value = burley_value,
+                                     .total = burley_total,
+                                     .disc = burley_disc,
+                                     .slowest = burley_slowest,
+                                     .sound = burley_sound};

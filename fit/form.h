@@ -2,18 +2,19 @@
 #pragma once
 #include "fit/profile.h"
 
-// All take the form's own parameters p and, where it is a sum, its number of terms. `gradient` may be NULL.
-typedef struct alb_form_row {
+typedef struct alb_form_row alb_form_row;
+// All take the row and the form's own parameters p. `gradient` may be NULL.
+struct alb_form_row {
     const char *name;
-    int parameter_count, term_count;
-    bool singular; // S grows as 1/r towards r = 0
+    int parameter_count, term_count; // of each term as many parameters
+    bool singular;                   // S grows as 1/r towards r = 0
     alb_parameter parameters[ALB_PARAMETERS_MAX];
-    double (*value)(double *gradient, const double *p, int terms, double r_mm);
-    double (*total)(double *gradient, const double *p, int terms);
-    double (*disc)(const double *p, int terms, double rho_mm);
-    double (*slowest)(const double *p, int terms); // -d ln S / dr far out
-    bool (*sound)(const double *p, int terms);     // S finite, nowhere negative, falling off; terms in order
-} alb_form_row;
+    double (*value)(double *gradient, const alb_form_row *row, const double *p, double r_mm);
+    double (*total)(double *gradient, const alb_form_row *row, const double *p);
+    double (*disc)(const alb_form_row *row, const double *p, double rho_mm);
+    double (*slowest)(const alb_form_row *row, const double *p); // -d ln S / dr far out
+    bool (*sound)(const alb_form_row *row, const double *p);     // S finite, nowhere negative, falling off; in order
+};
 
-extern const alb_form_row alb_dipole_row, alb_burley_row, alb_two_exponentials_over_r_row, alb_buried_source_row,
-    alb_two_buried_sources_row;
+extern const alb_form_row alb_dipole_row, alb_better_dipole_row, alb_burley_row, alb_two_over_r_row,
+    alb_buried_source_row, alb_two_buried_sources_row;

@@ -17,12 +17,13 @@ typedef enum alb_form {
     ALB_FORM_BURLEY,              // A (e^(-r/d) + e^(-r/(3 d))) / (8 pi d r) (Christensen & Burley 2015)
     ALB_FORM_BURIED_SOURCE,       // a e^(-b (rho - z)) / rho, rho^2 = r^2 + z^2, all > 0: flat at r = 0
     ALB_FORM_TWO_BURIED_SOURCES,  // two of them, b1 < b2
+    ALB_FORM_BETTER_DIPOLE,       // of a half-space (d'Eon 2012), as diffusion.h
     ALB_FORMS
 } alb_form;
 
 // Parameters, in order: of sums of exponentials a1, b1, a2, b2, a3, b3 (amplitude_1_per_mm2, decay_1_per_mm, ...), over
 // r the same in amplitude_1_per_mm; of buried sources a1, b1, z1, a2, b2, z2 (depth_1_mm); of Burley's albedo (A) and
-// length_mm (d); of the dipole absorption_per_mm, reduced_scattering_per_mm, refractive_index.
+// length_mm (d); of the dipoles absorption_per_mm, reduced_scattering_per_mm, refractive_index.
 typedef struct alb_profile {
     alb_form form;
     double parameters[ALB_PARAMETERS_MAX];

@@ -4,15 +4,15 @@
 //   integral_0^rho S r dr = sum_j a_j (1 - (1 + b_j rho) e^(-b_j rho)) / b_j^2,  total = 2 pi sum_j a_j / b_j^2.
 //   Positive terms are log-convex with a cusp at r = 0. With one negative amplitude, b1 < b2 and a1 + a2 >= 0, S
 //   stays positive (the negative term starts lower and dies first) and can be flat at r = 0, as transmission is.
-// The other rows: buried.c, dipole.c.
+// The other rows: buried.c, dipole.c (diffusion.c).
 #include "fit/form.h"
 #include <math.h>
 #include <string.h>
 
-static double exponentials_value(double *gradient, const double *p, int terms, double r_mm)
+static double exponentials_value(double *gradient, const alb_form_row *row, const double *p, double r_mm)
 {
     double sum = 0;
-    for (int j = 0; j < terms; j++) {
+    for (int j = 0; j < row->term_count; j++) {
         const double a = p[2 * j], e = exp(-p[2 * j + 1] * r_mm);
         if (gradient) {
             gradient[2 * j] = e;
@@ -23,10 +23,10 @@ static double exponentials_value(double *gradient, const double *p, int terms, d
     return sum;
 }
 
-static double exponentials_total(double *gradient, const double *p, int terms)
+static double exponentials_total(double *gradient, const alb_form_row *row, const double *p)
 {
     double sum = 0;
-    for (int j = 0; j < terms; j++) {
+    for (int j = 0; j < row->term_count; j++) {
         const double a = p[2 * j], b = p[2 * j + 1];
         if (gradient) {
             gradient[2 * j] = 2 * M_PI / (b * b);
@@ -37,10 +37,10 @@ static double exponentials_total(double *gradient, const double *p, int terms)
     return sum;
 }
 
-static double exponentials_disc(const double *p, int terms, double rho_mm)
+static double exponentials_disc(const alb_form_row *row, const double *p, double rho_mm)
 {
     double sum = 0;
-    for (int j = 0; j < terms; j++) {
+    for (int j = 0; j < row->term_count; j++) {
         const double b = p[2 * j + 1], x = b * rho_mm;
         // 1 - (1 + x) e^-x loses its digits to cancellation where x is small
         const double share = x < 1e-2 ? x * x * (1.0 / 2 - x * (1.0 / 3 - x * (1.0 / 8 - x * (1.0 / 30 - x / 144))))
@@ -50,16 +50,16 @@ static double exponentials_disc(const double *p, int terms, double rho_mm)
     return sum;
 }
 
-static double exponentials_slowest(const double *p, int terms)
+static double exponentials_slowest(const alb_form_row *row, const double *p)
 {
-    (void)terms;
+    (void)row;
     return p[1];
 }
 
-static bool positive_sound(const double *p, int terms)
+static bool positive_sound(const alb_form_row *row, const double *p)
 {
     double before = 0;
-    for (int j = 0; j < terms; j++) {
+    for (int j = 0; j < row->term_count; j++) {
         if (!(p[2 * j] > 0 && p[2 * j + 1] > before))
             return false;
         before = p[2 * j + 1];
@@ -67,9 +67,9 @@ static bool positive_sound(const double *p, int terms)
     return true;
 }
 
-static bool signed_sound(const double *p, int terms)
+static bool signed_sound(const alb_form_row *row, const double *p)
 {
-    (void)terms;
+    (void)row;
     return p[0] > 0 && p[1] > 0 && p[2] <= 0 && p[0] + p[2] >= -1e-12 * p[0] && p[3] > p[1];
 }
 
@@ -111,7 +111,8 @@ static const alb_form_row *const rows[ALB_FORMS] = {
     [ALB_FORM_SIGNED_EXPONENTIALS] = &signed_exponentials,
     [ALB_FORM_THREE_EXPONENTIALS] = &three_exponentials,
     [ALB_FORM_DIPOLE] = &alb_dipole_row,
-    [ALB_FORM_TWO_OVER_R] = &alb_two_exponentials_over_r_row,
+    [ALB_FORM_BETTER_DIPOLE] = &alb_better_dipole_row,
+    [ALB_FORM_TWO_OVER_R] = &alb_two_over_r_row,
     [ALB_FORM_BURLEY] = &alb_burley_row,
     [ALB_FORM_BURIED_SOURCE] = &alb_buried_source_row,
     [ALB_FORM_TWO_BURIED_SOURCES] = &alb_two_buried_sources_row,
@@ -139,19 +140,19 @@ double alb_profile_value(const alb_profile *profile, double r_mm)
     const alb_form_row *row = rows[profile->form];
     if (row->singular && r_mm <= 0)
         return (double)INFINITY;
-    return row->value ? row->value(NULL, profile->parameters, row->term_count, r_mm) : 0;
+    return row->value ? row->value(NULL, row, profile->parameters, r_mm) : 0;
 }
 
 double alb_profile_total(const alb_profile *profile)
 {
     const alb_form_row *row = rows[profile->form];
-    return row->total ? row->total(NULL, profile->parameters, row->term_count) : 0;
+    return row->total ? row->total(NULL, row, profile->parameters) : 0;
 }
 
 double alb_profile_disc(const alb_profile *profile, double rho_mm)
 {
     const alb_form_row *row = rows[profile->form];
-    return row->disc ? row->disc(profile->parameters, row->term_count, rho_mm) : 0;
+    return row->disc ? row->disc(row, profile->parameters, rho_mm) : 0;
 }
 
 double alb_profile_ring(const alb_profile *profile, double inner_mm, double outer_mm)
@@ -163,19 +164,19 @@ double alb_profile_ring(const alb_profile *profile, double inner_mm, double oute
 double alb_profile_gradient(double gradient[ALB_PARAMETERS_MAX], const alb_profile *profile, double r_mm)
 {
     const alb_form_row *row = rows[profile->form];
-    return row->value(gradient, profile->parameters, row->term_count, r_mm);
+    return row->value(gradient, row, profile->parameters, r_mm);
 }
 
 double alb_profile_total_gradient(double gradient[ALB_PARAMETERS_MAX], const alb_profile *profile)
 {
     const alb_form_row *row = rows[profile->form];
-    return row->total(gradient, profile->parameters, row->term_count);
+    return row->total(gradient, row, profile->parameters);
 }
 
 double alb_profile_slowest(const alb_profile *profile)
 {
     const alb_form_row *row = rows[profile->form];
-    return row->slowest(profile->parameters, row->term_count);
+    return row->slowest(row, profile->parameters);
 }
 
 bool alb_profile_sound(const alb_profile *profile)
@@ -184,7 +185,7 @@ bool alb_profile_sound(const alb_profile *profile)
     for (int p = 0; p < row->parameter_count; p++)
         if (!isfinite(profile->parameters[p]))
             return false;
-    return row->sound && row->sound(profile->parameters, row->term_count);
+    return row->sound && row->sound(row, profile->parameters);
 }
 
 void alb_profile_order(alb_profile *profile)
