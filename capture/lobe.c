@@ -1,15 +1,13 @@
 // From the cosines at which photons left to pi L / M: of a Lambertian face the share mu1^2 - mu0^2 of the light leaves
 // between the cosines mu0 and mu1, so that the ratio of a bin is what left through it, over that share.
 //
-// Photons are few: every bin is replaced by the weighted straight line through those within 0.2 of it (weights: the
-// Lambertian share, to which the variance of a ratio is inverse), which takes the noise near the normal down to
-// 1.6 / sqrt(photons that left). The table is scaled to keep the light: sum ratio * share = 1.
-// Where it stops being true: within 0.2 of grazing, where the ratio bends, the line is 0.01 off; and all distances
-// from the beam are given the same directions, which differ by 2 % at the normal within 3 mean free paths.
+// Photons are few: every bin is replaced by the weighted straight line through those within a quarter of its own cosine
+// and 0.2 (weights: the Lambertian share, to which the variance of a ratio is inverse), which takes the noise near the
+// normal down to 2 / sqrt(photons that left). The table is scaled to keep the light: sum ratio * share = 1.
+// Where it stops being true: all distances from the beam are given the same directions, which differ by 2 % at the
+// normal within 3 mean free paths.
 #include "capture/lobe.h"
 #include <math.h>
-
-static const double reach = 0.2;
 
 static double middle(int i) { return (i + 0.5) / ALB_PHOTON_COSINES; }
 
@@ -18,6 +16,7 @@ static double share(int i) { return (2 * i + 1) / (double)(ALB_PHOTON_COSINES * 
 // Value at `at` of the weighted straight line through the bins about it.
 static double line_at(const double *ratio, double at)
 {
+    const double reach = fmax(fmin(0.2, at / 4), 1.01 / ALB_PHOTON_COSINES);
     double w = 0, x = 0, xx = 0, y = 0, xy = 0;
     for (int i = 0; i < ALB_PHOTON_COSINES; i++) {
         const double d = middle(i) - at;
