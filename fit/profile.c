@@ -5,13 +5,9 @@
 //   Positive terms are log-convex with a cusp at r = 0. With one negative amplitude, b1 < b2 and a1 + a2 >= 0, S
 //   stays positive (the negative term starts lower and dies first) and can be flat at r = 0, as transmission is.
 //
-// Classic dipole of a half-space (Jensen et al. 2001, eq. 4): alpha' = s'/(a + s'), l = 1/(a + s'), sigma = sqrt(3 a (a
-// + s')),
-//   S(r) = alpha'/(4 pi) sum_i z_i (1 + sigma d_i) e^(-sigma d_i) / d_i^3,  d_i^2 = r^2 + z_i^2,  z = l, l (1 + 4 A /
-//   3) A = (1 + F) / (1 - F), F = -1.440/n^2 + 0.710/n + 0.668 + 0.0636 n; A = 1 for n = 1. d(-e^(-sigma d)/d) = (1 +
-//   sigma d) e^(-sigma d)/d^2 dd and r dr = d dd give disc and total in closed form. Not true within one mean free path
-//   of the beam, for alpha' below 0.8, or for slabs thinner than 8 mean free paths.
+// Classic dipole of a half-space (Jensen et al. 2001): diffusion.c.
 #include "fit/profile.h"
+#include "fit/diffusion.h"
 #include <assert.h>
 #include <math.h>
 #include <string.h>
@@ -55,57 +51,18 @@ bool alb_form_from_name(alb_form *form, const char *name)
     return false;
 }
 
-typedef struct dipole {
-    double weight, transport_per_mm, depth_mm[2]; // alpha'/(4 pi), sigma, z
-} dipole;
-
-static dipole dipole_of(const double *parameters)
+static alb_diffusion dipole_of(const double *parameters)
 {
-    const double absorption = parameters[0], scattering = parameters[1], index = parameters[2];
-    const double extinction = absorption + scattering;
-    if (!(extinction > 0))
-        return (dipole){.depth_mm = {1, 1}};
-    const double fresnel = -1.440 / (index * index) + 0.710 / index + 0.668 + 0.0636 * index;
-    const double a = index == 1 ? 1 : (1 + fresnel) / (1 - fresnel);
-    return (dipole){.weight = scattering / extinction / (4 * M_PI),
-                    .transport_per_mm = sqrt(3 * absorption * extinction),
-                    .depth_mm = {1 / extinction, (1 + 4 * a / 3) / extinction}};
-}
-
-static double dipole_value(const double *parameters, double r_mm)
-{
-    const dipole d = dipole_of(parameters);
-    double sum = 0;
-    for (int i = 0; i < 2; i++) {
-        const double distance = hypot(r_mm, d.depth_mm[i]), optical = d.transport_per_mm * distance;
-        sum += d.depth_mm[i] * (1 + optical) * exp(-optical) / (distance * distance * distance);
-    }
-    return d.weight * sum;
-}
-
-static double dipole_disc(const double *parameters, double rho_mm)
-{
-    const dipole d = dipole_of(parameters);
-    double sum = 0;
-    for (int i = 0; i < 2; i++) {
-        // e^(-sigma z) - (z/d) e^(-sigma d), written so that small discs keep their digits
-        const double z = d.depth_mm[i], distance = hypot(rho_mm, z), further = rho_mm * rho_mm / (distance + z);
-        const double u = further / distance, lost = -expm1(-d.transport_per_mm * further);
-        sum += exp(-d.transport_per_mm * z) * (u + (1 - u) * lost);
-    }
-    return d.weight * sum;
-}
-
-static double dipole_total(const double *parameters)
-{
-    const dipole d = dipole_of(parameters);
-    return 2 * M_PI * d.weight * (exp(-d.transport_per_mm * d.depth_mm[0]) + exp(-d.transport_per_mm * d.depth_mm[1]));
+    const alb_diffusion_face face = alb_diffusion_face_at(ALB_DIFFUSION_CLASSIC, parameters[2]);
+    return alb_diffusion_at(&face, parameters[0], parameters[1], 0);
 }
 
 double alb_profile_value(const alb_profile *profile, double r_mm)
 {
-    if (profile->form == ALB_FORM_DIPOLE)
-        return dipole_value(profile->parameters, r_mm);
+    if (profile->form == ALB_FORM_DIPOLE) {
+        const alb_diffusion body = dipole_of(profile->parameters);
+        return alb_diffusion_value(NULL, &body, ALB_REFLECTION, r_mm);
+    }
     double sum = 0;
     for (int j = 0; j < forms[profile->form].term_count; j++)
         sum += profile->parameters[2 * j] * exp(-profile->parameters[2 * j + 1] * r_mm);
@@ -114,16 +71,20 @@ double alb_profile_value(const alb_profile *profile, double r_mm)
 
 double alb_profile_total(const alb_profile *profile)
 {
-    if (profile->form == ALB_FORM_DIPOLE)
-        return dipole_total(profile->parameters);
+    if (profile->form == ALB_FORM_DIPOLE) {
+        const alb_diffusion body = dipole_of(profile->parameters);
+        return alb_diffusion_total(NULL, &body, ALB_REFLECTION);
+    }
     double gradient[ALB_PARAMETERS_MAX];
     return profile->form == ALB_FORM_NONE ? 0 : alb_profile_total_gradient(gradient, profile);
 }
 
 double alb_profile_disc(const alb_profile *profile, double rho_mm)
 {
-    if (profile->form == ALB_FORM_DIPOLE)
-        return dipole_disc(profile->parameters, rho_mm);
+    if (profile->form == ALB_FORM_DIPOLE) {
+        const alb_diffusion body = dipole_of(profile->parameters);
+        return alb_diffusion_disc(&body, ALB_REFLECTION, rho_mm);
+    }
     double sum = 0;
     for (int j = 0; j < forms[profile->form].term_count; j++) {
         const double b = profile->parameters[2 * j + 1], x = b * rho_mm;
