@@ -410,11 +410,11 @@ static bool find_end(point *end, alb_likelihood *l, alb_quantity quantity, doubl
     return isfinite(high) && !at_open_limit(l, end->u);
 }
 
-static void note_bound(double *worst, alb_likelihood *l, const point *at, bool open)
+static void note_bound(double *worst, alb_likelihood *l, const point *at)
 {
     double covariance[FREE][FREE], condition;
     const alb_profile profile = profile_at(l, at->u);
-    const bool known = !open && alb_likelihood_bound(covariance, &condition, l, &profile);
+    const bool known = alb_likelihood_bound(covariance, &condition, l, &profile);
     for (int k = 0; k < l->free_count; k++)
         if (l->parameter[k] >= 0)
             worst[l->parameter[k]] = fmax(worst[l->parameter[k]], known ? sqrt(covariance[k][k]) : (double)INFINITY);
@@ -432,7 +432,10 @@ alb_interval alb_likelihood_interval(alb_likelihood *l, alb_quantity quantity, d
         const double further = (ends[s].held - best.held) * (sqrt(bound_rise / rise) - 1);
         const point beyond =
             closed[s] ? point_near(&ends[s], l, quantity, ends[s].held + further, 0.01 * fabs(further)) : ends[s];
-        note_bound(worst, l, &beyond, !closed[s] || at_open_limit(l, beyond.u));
+        if (!closed[s] || at_open_limit(l, beyond.u))
+            worst[quantity.parameter] = INFINITY;
+        else
+            note_bound(worst, l, &beyond);
     }
     const bool negative = quantity.kind == ALB_QUANTITY_PARAMETER && l->best.parameters[quantity.parameter] < 0;
     const alb_interval interval = {exp(ends[0].held), exp(ends[1].held), !closed[0], !closed[1]};
