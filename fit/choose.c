@@ -188,8 +188,11 @@ static bool choose_with_discrepancy(int *chosen, fit fits[ALB_ATTEMPTS_MAX], dou
         else if (noise->readings->count > alb_candidate_parameters(candidates[f]) &&
                  !alb_discrepancy_search(&misfits[f], sd, candidates[f], basis, noise, energy_sd, error))
             return false;
-        if (!misfits[f].found)
+        if (!misfits[f].found) {
+            if (!*why)
+                snprintf(why, ALB_REASON_SIZE, "no term of this sign lowers chi-square beside the discrepancy");
             continue;
+        }
         snprintf(why, ALB_REASON_SIZE, "no form fits within the noise; this one misses by %.3g relative%s",
                  misfits[f].relative, misfits[f].decided ? "" : " and its parameters are not decided");
         if (best < 0 || better(f, &misfits[f], &misfits[best]))
