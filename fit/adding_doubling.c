@@ -32,13 +32,13 @@
 enum { MAX = ALB_STREAMS_MAX, DOUBLINGS_MAX = 60, HALF_SPACE_DOUBLINGS = 40 };
 
 // Optical thickness of the first layer in units of the smallest cosine.
-static const double first_layer = 0.5;
+static const double first_layer = 2;
 
 // Replaces the reflectances of nodes[0..count-1) above the critical cosine: with c_j = (1 - F_j) mu_j w_j,
 // sum_j c_j f(mu_j) = int (1 - F) mu f dmu for every polynomial f of degree count - 2; the last c is given.
 static void integrate_reflectance(alb_streams *streams, int first, double critical)
 {
-    enum { FINE = 48 };
+    enum { FINE = 24 }; // the integrand is a polynomial of degree 2 (count / 2) + 2 times a smooth square root
     const int last = streams->count - 1;
     double t[FINE], part[FINE], normal = streams->cosine[last] * streams->weight[last];
     normal *= 1 - streams->reflectance[last];

@@ -3,7 +3,7 @@
 // above the critical cosine c lie at c + (1 - c) t^2, over which Fresnel's reflectance is smooth.
 //   p = v+ + v-, m = v+ - v-, v = sqrt(mu w) I:  p' = -O m + q_m,  m' = -E p + q_p;  O = L L^T, L^T E L y = k^2 y gives
 //   p = L y e^(-+k z), m = +-k L^-T y e^(-+k z)  (Stamnes & Conklin 1984, in symmetric form).
-// Needs absorption > 0, n > 1, k d of no bound. Truncation g^40 (1.5 % of the peak at g = 0.9): 3e-6 of the flux.
+// Needs absorption > 0, n > 1, k d of no bound. Truncation at g^64: 1e-6 of the flux at g = 0.9.
 #pragma once
 #include "capture/photon.h"
 #include "fit/fresnel.h"
@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ORD_BELOW = 24, ORD_ABOVE = 40, ORD_N = ORD_BELOW + ORD_ABOVE, ORD_MOMENTS = 40 };
+enum { ORD_BELOW = 24, ORD_ABOVE = 64, ORD_N = ORD_BELOW + ORD_ABOVE, ORD_MOMENTS = 64 };
 
 typedef struct ordinates {
     double mu[ORD_N], w[ORD_N], face[ORD_N];
