@@ -1,21 +1,21 @@
 // From files to fitted sides.
 //
-// A session's products hold radiance per flux, L / Phi. The exitance is M = pi L for a face that leaves light as
-// Lambert says; real faces do within 5 % below 50 degrees and fall to 0.57 of it at 82 degrees, measured by Monte
-// Carlo, so that a camera further than 50 degrees off the normal is pointed out. The image of the spot on the white
-// reference serves both sides: it is the light that enters the front. Images given by hand keep their unit; what
-// saturates (integers at full scale) and what is not finite counts as not measured.
+// A session's products hold radiance per flux, L / Phi; every pixel is turned into exitance by the direction that it
+// sees the face from (exit_angle.c), which is 1 % uncertain for a smooth face and common to a side's readings. The
+// image of the spot on the white reference serves both sides: it is the light that enters the front. Images given by
+// hand keep their unit; what saturates (integers at full scale) and what is not finite counts as not measured.
 #include "fit/source.h"
 #include "base/image.h"
 #include "base/memory.h"
 #include "calibrate/calibration.h"
+#include "fit/exit_angle.h"
 #include "fit/table.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-// One channel of an image as numbers that the observer takes, times `factor`.
+// One channel of an image as numbers that the observer takes, times the factor of each pixel (NULL: 1).
 typedef struct plane {
     double *value, *variance;
 } plane;
@@ -27,7 +27,7 @@ static void plane_free(plane *out)
     *out = (plane){0};
 }
 
-static bool plane_take(plane *out, const alb_image *image, const char *channel, double factor, double saturation,
+static bool plane_take(plane *out, const alb_image *image, const char *channel, const double *factor, double saturation,
                        alb_error *error)
 {
     char variance_name[ALB_CHANNEL_NAME + 16];
@@ -44,9 +44,10 @@ static bool plane_take(plane *out, const alb_image *image, const char *channel, 
     for (size_t i = 0; i < count; i++) {
         const float *pixel = image->pixels + i * (size_t)image->channels;
         const double value = (double)pixel[c];
-        out->value[i] = isfinite(value) && value < saturation ? factor * value : (double)NAN;
+        const double f = factor ? factor[i] : 1;
+        out->value[i] = isfinite(value) && value < saturation ? f * value : (double)NAN;
         if (v >= 0)
-            out->variance[i] = factor * factor * (double)pixel[v];
+            out->variance[i] = f * f * (double)pixel[v];
     }
     return true;
 }
@@ -59,7 +60,8 @@ typedef struct photo {
     const alb_image *image;
     const alb_face *face;
     const alb_spot *spots[3];
-    double factor, saturation;
+    const double *factor; // of each pixel; NULL: 1
+    double saturation;
 } photo;
 
 // Observes one channel and builds its forward model.
@@ -150,7 +152,7 @@ static bool measure_spots(alb_spot spots[3], alb_provenance *provenance, const a
         char name[ALB_NAME_SIZE + 16];
         plane pixels = {0};
         snprintf(name, sizeof name, "%s %s", white->shot, calibration->channel_names[c]);
-        if (plane_take(&pixels, &image, calibration->channel_names[c], 1, INFINITY, &reasons[c])) {
+        if (plane_take(&pixels, &image, calibration->channel_names[c], NULL, INFINITY, &reasons[c])) {
             const alb_channel channel = {&face, pixels.value, pixels.variance, name};
             alb_spot_measure(&spots[c], &channel, &reasons[c]);
         }
@@ -181,17 +183,34 @@ static bool white_spot_for(white_spot *white, alb_provenance *provenance, const 
                     calibration->folder, pattern->diameter_px);
 }
 
-static void note_view(alb_text *notes, const alb_calibration *calibration, alb_side side)
+// M / L of every pixel of a face; NaN where it is seen too obliquely.
+static bool exitance_factor(double **factor, alb_text *notes, const alb_calibration *calibration, alb_side side,
+                            const alb_face *face, alb_error *error)
 {
-    const alb_transform world_from_camera = alb_inverse(&calibration->views[side].camera.camera_from_world);
-    const alb_vector eye = world_from_camera.translation;
-    const double angle_deg = acos(fabs(eye.z) / alb_length(eye)) * 180 / M_PI;
-    if (angle_deg > 50)
-        alb_text_add(
-            notes,
-            "%s: the camera looks %.0f degrees off the normal; beyond 50 a face leaves less than Lambert's law says, "
-            "and the profile comes out too low.\n",
-            alb_side_names[side], angle_deg);
+    const alb_exit exit = alb_exit_of(side, calibration->finish, calibration->refractive_index);
+    const size_t count = (size_t)face->width * (size_t)face->height;
+    const double least = cos(ALB_EXIT_MOST_DEG * M_PI / 180);
+    double steepest = 0, flattest = 1;
+    size_t oblique = 0;
+    if (!(*factor = alb_allocate(count, sizeof **factor, error)))
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        const double cosine = face->cosine[i];
+        (*factor)[i] = cosine >= least ? M_PI / alb_exit_ratio(&exit, cosine) : (double)NAN;
+        oblique += cosine < least;
+        if (cosine >= least)
+            steepest = fmax(steepest, cosine), flattest = fmin(flattest, cosine);
+    }
+    if (exit.smooth && steepest >= least)
+        alb_text_add(notes,
+                     "%s: seen %.1f to %.1f degrees off the normal of a smooth face, which sheds %.3f to %.3f of what "
+                     "Lambert's law says: corrected.\n",
+                     alb_side_names[side], acos(steepest) * 180 / M_PI, acos(flattest) * 180 / M_PI,
+                     alb_exit_ratio(&exit, steepest), alb_exit_ratio(&exit, flattest));
+    if (oblique)
+        alb_text_add(notes, "%s: %zu pixels see the face more than %d degrees off its normal and are left out.\n",
+                     alb_side_names[side], oblique, ALB_EXIT_MOST_DEG);
+    return true;
 }
 
 static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provenance *provenance, alb_text *notes,
@@ -199,19 +218,23 @@ static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provena
 {
     alb_image image = {0};
     alb_face face = {0};
-    note_view(notes, calibration, product->side);
+    double *factor = NULL;
     bool ok = read_product(&image, provenance, calibration, product, error) &&
               alb_face_seen(&face, &calibration->views[product->side].camera, error) &&
-              white_spot_for(white, provenance, calibration, &product->pattern, error);
+              white_spot_for(white, provenance, calibration, &product->pattern, error) &&
+              exitance_factor(&factor, notes, calibration, product->side, &face, error);
     if (ok) {
         const alb_spot *spots = white->spots;
         const photo seen = {product->shot, product->side, &image, &face, {&spots[0], &spots[1], &spots[2]},
-                            M_PI,          INFINITY};
+                            factor,        INFINITY};
         for (int c = 0; c < calibration->channels; c++)
             fitting->sides[product->side][c].common =
-                (alb_common_sd){product->relative_scale_sd[c], calibration->views[product->side].relative_length_sd};
+                (alb_common_sd){hypot(product->relative_scale_sd[c],
+                                      calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0),
+                                calibration->views[product->side].relative_length_sd};
         ok = observe_channels(fitting, &seen, notes, error);
     }
+    free(factor);
     alb_face_free(&face);
     alb_image_free(&image);
     return ok;
@@ -289,7 +312,7 @@ static bool observe_image(alb_fitting *fitting, alb_text *notes, const char *pat
     if (ok && bits)
         alb_text_add(notes, "%s: %d-bit values are taken as linear; those at full scale as not measured.\n",
                      alb_path_name(path), bits);
-    const photo seen = {path, side, &image, &face, {spot, spot, spot}, 1, saturation};
+    const photo seen = {path, side, &image, &face, {spot, spot, spot}, NULL, saturation};
     ok = ok && observe_channels(fitting, &seen, notes, error);
     alb_face_free(&face);
     alb_image_free(&image);
