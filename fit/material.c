@@ -1,6 +1,7 @@
 // material.json: written by fit, read strictly by render.
 #include "base/record.h"
 #include "fit/measurement.h"
+#include "fit/profile.h"
 #include "fit/search.h"
 #include <math.h>
 #include <stdio.h>
@@ -146,22 +147,13 @@ bool alb_material_write(const alb_fitting *fitting, const alb_provenance *proven
     return alb_json_write(&json, path, error);
 }
 
-// Parameters must keep S finite and positive everywhere.
 static bool check_profile(const alb_profile *profile, alb_node node, alb_error *error)
 {
     const double *p = profile->parameters;
-    bool good = p[0] > 0 && p[1] > 0;
-    if (profile->form == ALB_FORM_TWO_EXPONENTIALS)
-        good &= p[2] >= 0 && p[3] > 0;
-    if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS)
-        good &= p[2] <= 0 && p[0] + p[2] >= -1e-12 * p[0] && p[3] > p[1];
-    if (profile->form == ALB_FORM_THREE_EXPONENTIALS)
-        good &= p[2] > 0 && p[3] > p[1] && p[4] > 0 && p[5] > p[3];
-    if (profile->form == ALB_FORM_DIPOLE)
-        good = p[0] > 0 && p[1] > 0 && p[2] >= 1 && p[2] <= 3;
-    return good || alb_node_fail(error, node, "parameters",
-                                 "not a positive profile that falls off: %s (%g, %g, %g, %g, %g, %g)",
-                                 alb_form_name(profile->form), p[0], p[1], p[2], p[3], p[4], p[5]);
+    return alb_profile_sound(profile) ||
+           alb_node_fail(error, node, "parameters",
+                         "not a positive profile that falls off: %s (%g, %g, %g, %g, %g, %g)",
+                         alb_form_name(profile->form), p[0], p[1], p[2], p[3], p[4], p[5]);
 }
 
 static const char estimate_keys[] = "value sd interval_95 cramer_rao_sd identifiable because";
