@@ -27,5 +27,5 @@ bool alb_options_read(const alb_option *options, int option_count, int argc, cha
 bool alb_option_number(double *out, const char *name, const char *text, double minimum, double maximum,
                        alb_error *error);
 
-extern const alb_command alb_capture_command, alb_calibrate_command, alb_fit_command, alb_render_command,
-    alb_compare_command;
+extern const alb_command alb_capture_command, alb_calibrate_command, alb_fit_command, alb_export_command,
+    alb_render_command, alb_compare_command;

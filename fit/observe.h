@@ -8,6 +8,7 @@
 typedef struct alb_face {
     int width, height;
     double *x_mm, *y_mm, *area_mm2;
+    double *cosine; // of the line of sight to the face's normal
 } alb_face;
 
 // A plane seen square on.

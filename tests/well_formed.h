@@ -33,7 +33,19 @@ static inline const char *pass_tag(const char *s, char name[32], bool *closed)
     return s + (*closed ? 2 : 1);
 }
 
-// One root element, perhaps after <!DOCTYPE html>. Style sheets may hold anything but '<'.
+// Past a comment or a processing instruction that starts at `s`; `s` itself where none does, NULL where it is broken.
+static inline const char *pass_aside(const char *s)
+{
+    const bool comment = strncmp(s, "<!--", 4) == 0;
+    if (!comment && strncmp(s, "<?", 2) != 0)
+        return s;
+    const char *end = comment ? strstr(s + 4, "--") : strstr(s, "?>");
+    if (!end || (comment && end[2] != '>'))
+        return malformed_at(s, "aside");
+    return end + (comment ? 3 : 2);
+}
+
+// One root element, perhaps after <!DOCTYPE html> or <?xml?>. Style sheets may hold anything but '<'.
 static inline bool well_formed(const char *text)
 {
     char open[64][32], name[32];
@@ -42,7 +54,12 @@ static inline bool well_formed(const char *text)
         text += 15;
     for (const char *s = text; *s;) {
         bool closed = false;
-        if (strncmp(s, "</", 2) == 0) {
+        const char *aside = pass_aside(s);
+        if (!aside)
+            return false;
+        if (aside > s)
+            s = aside;
+        else if (strncmp(s, "</", 2) == 0) {
             const size_t n = strcspn(s, ">");
             if (depth == 0 || strncmp(open[depth - 1], s + 2, n - 2) != 0 || open[depth - 1][n - 2] != '\0')
                 return malformed_at(s, "closes what is not open") != NULL;

@@ -80,6 +80,18 @@ static void make_pictures(void)
     alb_image_free(&zero);
 }
 
+// A material of one channel, whose total must be that of its parameters.
+static void save_material(const char *path, const char *form, const char *parameters, double total)
+{
+    char text[1024];
+    snprintf(
+        text, sizeof text,
+        "{\"format\":1,\"name\":\"wax\",\"channels\":{\"Y\":{\"reflection\":{\"form\":\"%s\",\"identifiable\":false,"
+        "\"parameters\":{%s},\"total\":{\"value\":%.17g},\"chi_square\":1,\"degrees_of_freedom\":1}}}}",
+        form, parameters, total);
+    save_text(path, text);
+}
+
 static void make_texts(void)
 {
     char text[2048];
@@ -108,6 +120,10 @@ static void make_texts(void)
     save_scene("cli/scene_cut_ply.json", "cut.ply", "");
     save_scene("cli/scene_missing.json", "nowhere.obj", "");
     save_scene("cli/scene_unknown.json", "cube.obj", ",\"bounces\":3");
+    save_material("cli/bright.json", "exponential",
+                  "\"amplitude_1_per_mm2\":{\"value\":1},\"decay_1_per_mm\":{\"value\":1}", 2 * M_PI);
+    save_material("cli/wax.json", "exponential",
+                  "\"amplitude_1_per_mm2\":{\"value\":0.1},\"decay_1_per_mm\":{\"value\":1}", 0.2 * M_PI);
     save_text("cli/board/blank.txt", "");
     save_picture("cli/board/blank.png", FLAT, 64);
 }
@@ -190,15 +206,15 @@ static void check_scenarios(const scenario *scenarios, size_t count)
 static void help_and_version(void **state)
 {
     (void)state;
-    const char *const commands[] = {"capture", "calibrate", "fit", "render", "compare"};
+    const char *const commands[] = {"capture", "calibrate", "fit", "export", "render", "compare"};
     const char *const general[] = {"", "help", "--help", "-h"};
     for (int i = 0; i < 4; i++) {
         assert_int_equal(run(general[i]), 0);
         assert_string_equal(complaint, "");
-        for (int c = 0; c < 5; c++)
+        for (int c = 0; c < 6; c++)
             assert_non_null(strstr(output, commands[c]));
     }
-    for (int c = 0; c < 5; c++) {
+    for (int c = 0; c < 6; c++) {
         char arguments[64];
         snprintf(arguments, sizeof arguments, "help %s", commands[c]);
         assert_int_equal(run(arguments), 0);
@@ -235,6 +251,12 @@ static void usage_errors(void **state)
         {"fit --table cli/profile.csv --side up -o cli/kept", ALB_USAGE, "up"},
         {"fit cli/kept --wibble", ALB_USAGE, "--wibble"},
         {"fit cli/kept -o", ALB_USAGE, "-o"},
+        {"export", ALB_USAGE, "missing"},
+        {"export cli/material.json --to pbrt", ALB_USAGE, "-o"},
+        {"export cli/material.json -o cli/kept/picture.exr", ALB_USAGE, "--to"},
+        {"export cli/material.json --to teapot -o cli/kept/picture.exr", ALB_USAGE, "teapot"},
+        {"export cli/material.json --to pbrt --unit-mm 0 -o cli/kept/picture.exr", ALB_USAGE, "--unit-mm"},
+        {"export cli/material.json --to csv --unit-mm 5 -o cli/kept/picture.exr", ALB_USAGE, "millimetres"},
         {"render", ALB_USAGE, "missing"},
         {"render cli/scene.json", ALB_USAGE, "-o"},
         {"render cli/scene.json -o cli/kept/picture.exr -o twice.exr", ALB_USAGE, "twice"},
@@ -262,6 +284,9 @@ static void files_that_are_not_there(void **state)
         {"fit nowhere", ALB_ACCESS, "nowhere"},
         {"fit --image nowhere.exr --mm-per-pixel 1 -o cli/kept", ALB_ACCESS, "nowhere.exr"},
         {"fit --table nowhere.csv --side reflection -o cli/kept", ALB_ACCESS, "nowhere.csv"},
+        {"export nowhere.json --to pbrt -o cli/kept/picture.exr", ALB_ACCESS, "nowhere.json"},
+        {"export cli/wax.json --to pbrt -o nowhere/at/all.pbrt", ALB_ACCESS, "nowhere/at"},
+        {"export cli/wax.json --to pbrt -o cli/kept", ALB_ACCESS, "cli/kept"},
         {"render nowhere.json -o cli/kept/picture.exr", ALB_ACCESS, "nowhere.json"},
         {"render cli/scene_missing.json -o cli/kept/picture.exr", ALB_ACCESS, "nowhere.obj"},
         {"render cli/scene.json -o /nowhere/at/all.exr", ALB_ACCESS, "/nowhere/at"},
@@ -287,6 +312,9 @@ static void content_that_is_wrong(void **state)
         {"capture cli/plan.json -o cli/new --rig virtual:cli/cut.json", ALB_BAD_DATA, "cut.json"},
         {"calibrate cli/kept", ALB_BAD_DATA, "session.json"},
         {"fit cli/kept", ALB_BAD_DATA, "json"},
+        {"export cli/empty.json --to pbrt -o cli/kept/picture.exr", ALB_BAD_DATA, "empty.json"},
+        {"export cli/plan.json --to pbrt -o cli/kept/picture.exr", ALB_BAD_DATA, "plan.json"},
+        {"export cli/bright.json --to pbrt -o cli/kept/picture.exr", ALB_BAD_DATA, "reflects 6.283 of the light"},
         {"render cli/empty.json -o cli/kept/picture.exr", ALB_BAD_DATA, "empty.json"},
         {"render cli/cut.json -o cli/kept/picture.exr", ALB_BAD_DATA, "cut.json"},
         {"render cli/scene_unknown.json -o cli/kept/picture.exr", ALB_BAD_DATA, "bounces"},
@@ -347,6 +375,27 @@ static void good_input_still_works(void **state)
 }
 
 // A stated profile 0.01 e^(-r/2) through a table: its total is 0.08 pi = 0.2513, the truth says 0.25 and then 0.26.
+// What is written says what was asked, and a file that stood there goes with it.
+static void exported_files(void **state)
+{
+    (void)state;
+    const char *const formats[] = {"cycles", "pbrt", "mitsuba", "openpbr", "arnold", "csv"};
+    for (int i = 0; i < 6; i++) {
+        char arguments[128];
+        snprintf(arguments, sizeof arguments, "export cli/wax.json --to %s -o cli/exported%s", formats[i],
+                 i < 5 ? " --unit-mm 1000" : "");
+        assert_int_equal(run(arguments), 0);
+        char *text = slurp("cli/exported");
+        assert_non_null(strstr(text, i < 5 ? "1 unit of the scene = 1000 mm" : "channel,r_mm,"));
+        assert_non_null(strstr(text, i < 5 ? "a best guess" : "Y,0,0.1,,,\n"));
+        assert_null(strstr(text, "nan"));
+        free(text);
+    }
+    assert_int_equal(run("export cli/wax.json --to pbrt -o cli/exported --json"), 0);
+    assert_non_null(strstr(output, "\"burley_length_mm\""));
+    assert_string_equal(complaint, "");
+}
+
 static void limits_decide_the_exit_code(void **state)
 {
     (void)state;
@@ -385,6 +434,7 @@ int main(void)
         cmocka_unit_test(content_that_is_wrong),
         cmocka_unit_test(measurements_that_show_nothing),
         cmocka_unit_test(good_input_still_works),
+        cmocka_unit_test(exported_files),
         cmocka_unit_test(limits_decide_the_exit_code),
     };
     return cmocka_run_group_tests(tests, make_inputs, remove_inputs);
