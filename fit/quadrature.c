@@ -34,7 +34,7 @@ static void find_roots(double *node, double *weight, int n, bool radau)
         const double high = M_PI * (i + 0.25) / (steps + 0.5), at_high = polynomial(n, high, radau);
         if ((at_low < 0) != (at_high < 0)) {
             double a = high, b = low, before;
-            for (int k = 0; k < 52 && b - a > 4e-16 * b; k++) {
+            for (int k = 0; k < 54; k++) {
                 const double middle = (a + b) / 2;
                 *((polynomial(n, middle, radau) < 0) == (at_high < 0) ? &a : &b) = middle;
             }
