@@ -269,6 +269,8 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, 
         memcpy(material->name, calibration->sample, sizeof material->name);
         material->thickness_mm = calibration->thickness_mm;
         material->refractive_index = calibration->refractive_index;
+        fitting->basis.finish = calibration->finish;
+        fitting->basis.own_sd = calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0;
         material->channels = calibration->channels;
         memcpy(material->channel_names, calibration->channel_names, sizeof material->channel_names);
         ok = observe_products(fitting, provenance, notes, calibration, error) && alb_fitting_run(fitting, error);
