@@ -6,7 +6,8 @@
 //    at 1 % shared by two candidates (0.5 % each), or BIC, whichever asks more. Between equally rich forms the smaller
 //    chi-square decides.
 // 2. A form stands where P(chi-square) >= 1e-3; where the one taken does not, the simplest that does is taken. Its
-//    parameters, covariance and total are those of this fit, and nothing else enters.
+//    parameters, covariance and total are those of this fit, and nothing else enters. Where the data do not identify
+//    its parameters (uncertainty.c), a simpler form that stands and whose parameters they do identify is taken instead.
 // 3. Where none of them stands, three exponentials (6 parameters) are fitted, and taken where they stand and the noise
 //    decides their parameters. So data made by two terms see a third in one case of 1000 at most.
 // 4. Where no form stands, the form is an approximation and its errors are not those of the noise (discrepancy.c). The
@@ -110,13 +111,37 @@ static int simplest(const fit fits[ALB_ATTEMPTS_MAX], const alb_outcome *outcome
     return -1;
 }
 
+// Where the data do not identify the parameters of the form taken, the richest simpler one that stands and whose they
+// do is taken in its place; *unidentified is the one given up, -1 for none.
+static bool settle_for_identified(int *chosen, int *unidentified, char because[ALB_BECAUSE_SIZE],
+                                  const fit fits[ALB_ATTEMPTS_MAX], const alb_outcome *outcome,
+                                  const alb_weighing *noise, alb_error *error)
+{
+    char other[ALB_BECAUSE_SIZE];
+    *unidentified = -1;
+    for (int f = *chosen; f >= ONE; f--) {
+        bool identifiable;
+        const bool simpler = alb_candidate_parameters(candidates[f]) < alb_candidate_parameters(candidates[*chosen]);
+        if (!fits[f].found || !stands(&outcome->attempts[f]) || (f != *chosen && !simpler))
+            continue;
+        if (!alb_identify(&identifiable, f == *chosen ? because : other, &fits[f].profile, candidates[f], noise, error))
+            return false;
+        if (identifiable) {
+            *unidentified = f == *chosen ? -1 : *chosen;
+            *chosen = f;
+            break;
+        }
+    }
+    return true;
+}
+
 // *chosen is the index of the form to take by the noise, -1 where none stands.
 static bool choose_by_noise(int *chosen, fit fits[ALB_ATTEMPTS_MAX], alb_outcome *outcome, const alb_basis *basis,
                             const alb_weighing *noise, alb_error *error)
 {
-    double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX];
-    bool full_rank;
-    int which;
+    char because[ALB_BECAUSE_SIZE];
+    int unidentified;
+    bool identifiable;
     if (!fit_by_noise(fits, outcome, ONE, SIGNED, basis, noise, error))
         return false;
     *chosen = simplest(fits, outcome, noise->readings->count);
@@ -124,13 +149,20 @@ static bool choose_by_noise(int *chosen, fit fits[ALB_ATTEMPTS_MAX], alb_outcome
         if (!fit_by_noise(fits, outcome, THREE, THREE, basis, noise, error))
             return false;
         if (stands(&outcome->attempts[THREE])) {
-            if (!alb_search_covariance(covariance, &full_rank, &fits[THREE].profile, candidates[THREE], noise, error))
+            if (!alb_identify(&identifiable, because, &fits[THREE].profile, candidates[THREE], noise, error))
                 return false;
-            *chosen = alb_parameters_decided(&which, &fits[THREE].profile, full_rank, covariance) ? THREE : -1;
+            *chosen = identifiable ? THREE : -1;
         }
     }
-    if (*chosen >= 0)
-        explain(fits, outcome, *chosen);
+    if (*chosen < 0)
+        return true;
+    if (!settle_for_identified(chosen, &unidentified, because, fits, outcome, noise, error))
+        return false;
+    explain(fits, outcome, *chosen);
+    if (unidentified >= 0)
+        snprintf(outcome->attempts[unidentified].rejected, ALB_REASON_SIZE,
+                 "lowers chi-square by %.4g, but is not identifiable: %s",
+                 fits[*chosen].chi_square - fits[unidentified].chi_square, because);
     return true;
 }
 

@@ -1,6 +1,7 @@
 // The simplest form that the noise does not reject, and what is known of it.
 #pragma once
 #include "fit/operator.h"
+#include "fit/uncertainty.h"
 
 enum { ALB_ATTEMPTS_MAX = 5, ALB_REASON_SIZE = 320 };
 
@@ -21,6 +22,7 @@ typedef struct alb_outcome {
     double rms_relative;         // (measured - fitted) / fitted over the readings above 3 sd
     double measured_share;       // share of the total within the readings
     double slope_per_mm, slope_sd, slope_from_mm, slope_to_mm; // d ln S / dr over the outer half of the readings
+    alb_knowledge knowledge;
     char undecided[ALB_REASON_SIZE]; // why the data do not decide; empty where they do (fitted.identifiable)
 } alb_outcome;
 
