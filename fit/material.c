@@ -7,6 +7,13 @@
 #include <stdio.h>
 #include <string.h>
 
+static void find_properties(alb_fitting *fitting)
+{
+    for (int i = 0; i < ALB_SIDES * 3; i++)
+        fitting->basis.common_sd[i / 3][i % 3] = fitting->sides[i / 3][i % 3].common.flux;
+    alb_properties_find(fitting->properties, &fitting->material, &fitting->basis);
+}
+
 bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
 {
     alb_error reasons[ALB_SIDES * 3] = {{0}};
@@ -24,6 +31,7 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
         if (reasons[i].status != ALB_OK)
             return alb_fail(error, reasons[i].status, "%s %s: %s", alb_side_names[i / 3],
                             fitting->material.channel_names[i % 3], reasons[i].text);
+    find_properties(fitting);
     return true;
 }
 
@@ -136,6 +144,7 @@ void alb_material_put(alb_json *json, const alb_fitting *fitting)
         for (int side = 0; side < ALB_SIDES; side++)
             if (fitting->sides[side][c].measured)
                 put_outcome(json, alb_side_names[side], &fitting->sides[side][c].outcome);
+        alb_properties_put(json, &fitting->properties[c]);
         alb_json_end_object(json);
     }
     alb_json_end_object(json);
@@ -251,7 +260,8 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
             return alb_node_fail(error, channels, key, "name longer than 7 characters");
         snprintf(material->channel_names[c], sizeof material->channel_names[0], "%s", key);
         if (!alb_node_object(&channel, channels, key, error) ||
-            !alb_node_allow(channel, "reflection transmission", error))
+            !alb_node_allow(channel, "reflection transmission optical_properties", error) ||
+            !alb_properties_check(channel, error))
             return false;
         for (int side = 0; side < ALB_SIDES; side++)
             if (alb_node_has(channel, alb_side_names[side]) &&
