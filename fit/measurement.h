@@ -14,6 +14,7 @@ typedef struct alb_measurement {
 typedef struct alb_fitting {
     alb_material
         material; // name, thickness_mm, refractive_index, channels and their names; fitted is filled by alb_fitting_run
+    bool absolute; // values are in units of the incident flux
     alb_measurement sides[ALB_SIDES][3];
 } alb_fitting;
 
