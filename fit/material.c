@@ -1,10 +1,18 @@
 // material.json: written by fit, read strictly by render.
 #include "base/record.h"
 #include "fit/energy.h"
+#include "fit/profile.h"
 #include "fit/search.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+
+static void find_properties(alb_fitting *fitting)
+{
+    for (int i = 0; i < ALB_SIDES * 3; i++)
+        fitting->basis.common_sd[i / 3][i % 3] = fitting->sides[i / 3][i % 3].common.flux;
+    alb_properties_find(fitting->properties, &fitting->material, &fitting->basis);
+}
 
 bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
 {
@@ -27,6 +35,7 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
     for (int i = 0; i < ALB_SIDES * 3; i++)
         if (fitting->sides[i / 3][i % 3].measured)
             fitting->material.fitted[i / 3][i % 3] = fitting->sides[i / 3][i % 3].outcome.fitted;
+    find_properties(fitting);
     return true;
 }
 
@@ -139,6 +148,7 @@ void alb_material_put(alb_json *json, const alb_fitting *fitting)
         for (int side = 0; side < ALB_SIDES; side++)
             if (fitting->sides[side][c].measured)
                 put_outcome(json, alb_side_names[side], &fitting->sides[side][c].outcome);
+        alb_properties_put(json, &fitting->properties[c]);
         alb_json_end_object(json);
     }
     alb_json_end_object(json);
@@ -156,22 +166,13 @@ bool alb_material_write(const alb_fitting *fitting, const alb_provenance *proven
     return alb_json_write(&json, path, error);
 }
 
-// Parameters must keep S finite and positive everywhere.
 static bool check_profile(const alb_profile *profile, alb_node node, alb_error *error)
 {
     const double *p = profile->parameters;
-    bool good = p[0] > 0 && p[1] > 0;
-    if (profile->form == ALB_FORM_TWO_EXPONENTIALS)
-        good &= p[2] >= 0 && p[3] > 0;
-    if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS)
-        good &= p[2] <= 0 && p[0] + p[2] >= -1e-12 * p[0] && p[3] > p[1];
-    if (profile->form == ALB_FORM_THREE_EXPONENTIALS)
-        good &= p[2] > 0 && p[3] > p[1] && p[4] > 0 && p[5] > p[3];
-    if (profile->form == ALB_FORM_DIPOLE)
-        good = p[0] > 0 && p[1] > 0 && p[2] >= 1 && p[2] <= 3;
-    return good || alb_node_fail(error, node, "parameters",
-                                 "not a positive profile that falls off: %s (%g, %g, %g, %g, %g, %g)",
-                                 alb_form_name(profile->form), p[0], p[1], p[2], p[3], p[4], p[5]);
+    return alb_profile_sound(profile) ||
+           alb_node_fail(error, node, "parameters",
+                         "not a positive profile that falls off: %s (%g, %g, %g, %g, %g, %g)",
+                         alb_form_name(profile->form), p[0], p[1], p[2], p[3], p[4], p[5]);
 }
 
 static const char estimate_keys[] = "value sd interval_95 cramer_rao_sd identifiable because";
@@ -264,7 +265,8 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
             return alb_node_fail(error, channels, key, "name longer than 7 characters");
         snprintf(material->channel_names[c], sizeof material->channel_names[0], "%s", key);
         if (!alb_node_object(&channel, channels, key, error) ||
-            !alb_node_allow(channel, "reflection transmission", error))
+            !alb_node_allow(channel, "reflection transmission optical_properties", error) ||
+            !alb_properties_check(channel, error))
             return false;
         for (int side = 0; side < ALB_SIDES; side++)
             if (alb_node_has(channel, alb_side_names[side]) &&

@@ -9,36 +9,32 @@
 #include "base/memory.h"
 #include "calibrate/calibration.h"
 #include "fit/exit_angle.h"
+#include "fit/product.h"
 #include "fit/table.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-// One channel of an image as numbers that the observer takes, times the factor of each pixel (NULL: 1).
-typedef struct plane {
-    double *value, *variance;
-} plane;
-
-static void plane_free(plane *out)
+void alb_plane_free(alb_plane *out)
 {
     free(out->value);
     free(out->variance);
-    *out = (plane){0};
+    *out = (alb_plane){0};
 }
 
-static bool plane_take(plane *out, const alb_image *image, const char *channel, const double *factor, double saturation,
-                       alb_error *error)
+bool alb_plane_take(alb_plane *out, const alb_image *image, const char *channel, const double *factor,
+                    double saturation, alb_error *error)
 {
     char variance_name[ALB_CHANNEL_NAME + 16];
     snprintf(variance_name, sizeof variance_name, "variance.%s", channel);
     const int c = alb_image_channel(image, channel), v = alb_image_channel(image, variance_name);
     const size_t count = (size_t)image->width * (size_t)image->height;
-    *out = (plane){.value = alb_allocate(count, sizeof(double), error)};
+    *out = (alb_plane){.value = alb_allocate(count, sizeof(double), error)};
     if (v >= 0)
         out->variance = alb_allocate(count, sizeof(double), error);
     if (!out->value || (v >= 0 && !out->variance)) {
-        plane_free(out);
+        alb_plane_free(out);
         return false;
     }
     for (size_t i = 0; i < count; i++) {
@@ -68,17 +64,17 @@ typedef struct photo {
 static bool observe_channel(alb_fitting *fitting, const photo *seen, int channel, alb_text *notes, alb_error *error)
 {
     char name[64], full_name[1024];
-    plane pixels = {0};
+    alb_plane pixels = {0};
     const char *channel_name = fitting->material.channel_names[channel];
     alb_measurement *measurement = &fitting->sides[seen->side][channel];
     alb_readings *readings = &measurement->readings;
     snprintf(name, sizeof name, "%s %s", alb_side_names[seen->side], channel_name);
     snprintf(full_name, sizeof full_name, "%.900s: %s", seen->from, name);
-    bool ok = plane_take(&pixels, seen->image, channel_name, seen->factor, seen->saturation, error);
+    bool ok = alb_plane_take(&pixels, seen->image, channel_name, seen->factor, seen->saturation, error);
     const alb_channel observed = {seen->face, pixels.value, pixels.variance, full_name};
     ok = ok && alb_observe(readings, &observed, error) &&
          alb_operator_create(&measurement->forward, readings, seen->spots[channel], error);
-    plane_free(&pixels);
+    alb_plane_free(&pixels);
     if (ok && readings->core_mm > 0)
         alb_text_add(notes,
                      "%s: pixels out to %.4g mm of the centre are not measured (saturated); the core is the form's.\n",
@@ -106,8 +102,8 @@ static bool observe_channels(alb_fitting *fitting, const photo *seen, alb_text *
     return all;
 }
 
-static bool read_product(alb_image *image, alb_provenance *provenance, const alb_calibration *calibration,
-                         const alb_product *product, alb_error *error)
+bool alb_product_read(alb_image *image, alb_provenance *provenance, const alb_calibration *calibration,
+                      const alb_product *product, alb_error *error)
 {
     char path[ALB_PATH_SIZE];
     if (!alb_calibration_image(path, calibration, product, error) || !alb_provenance_add(provenance, path, error) ||
@@ -144,19 +140,19 @@ static bool measure_spots(alb_spot spots[3], alb_provenance *provenance, const a
 {
     alb_image image = {0};
     alb_face face = {0};
-    bool ok = read_product(&image, provenance, calibration, white, error) &&
+    bool ok = alb_product_read(&image, provenance, calibration, white, error) &&
               alb_face_seen(&face, &calibration->views[white->side].camera, error);
     alb_error reasons[3] = {{0}};
 #pragma omp parallel for schedule(dynamic)
     for (int c = 0; c < (ok ? calibration->channels : 0); c++) {
         char name[ALB_NAME_SIZE + 16];
-        plane pixels = {0};
+        alb_plane pixels = {0};
         snprintf(name, sizeof name, "%s %s", white->shot, calibration->channel_names[c]);
-        if (plane_take(&pixels, &image, calibration->channel_names[c], NULL, INFINITY, &reasons[c])) {
+        if (alb_plane_take(&pixels, &image, calibration->channel_names[c], NULL, INFINITY, &reasons[c])) {
             const alb_channel channel = {&face, pixels.value, pixels.variance, name};
             alb_spot_measure(&spots[c], &channel, &reasons[c]);
         }
-        plane_free(&pixels);
+        alb_plane_free(&pixels);
     }
     for (int c = 0; c < 3; c++)
         if (ok && reasons[c].status != ALB_OK)
@@ -183,9 +179,8 @@ static bool white_spot_for(white_spot *white, alb_provenance *provenance, const 
                     calibration->folder, pattern->diameter_px);
 }
 
-// M / L of every pixel of a face; NaN where it is seen too obliquely.
-static bool exitance_factor(double **factor, alb_text *notes, const alb_calibration *calibration, alb_side side,
-                            const alb_face *face, alb_error *error)
+bool alb_exitance_factor(double **factor, alb_text *notes, const alb_calibration *calibration, alb_side side,
+                         const alb_face *face, alb_error *error)
 {
     const alb_exit exit = alb_exit_of(side, calibration->finish, calibration->refractive_index);
     const size_t count = (size_t)face->width * (size_t)face->height;
@@ -219,10 +214,10 @@ static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provena
     alb_image image = {0};
     alb_face face = {0};
     double *factor = NULL;
-    bool ok = read_product(&image, provenance, calibration, product, error) &&
+    bool ok = alb_product_read(&image, provenance, calibration, product, error) &&
               alb_face_seen(&face, &calibration->views[product->side].camera, error) &&
               white_spot_for(white, provenance, calibration, &product->pattern, error) &&
-              exitance_factor(&factor, notes, calibration, product->side, &face, error);
+              alb_exitance_factor(&factor, notes, calibration, product->side, &face, error);
     if (ok) {
         const alb_spot *spots = white->spots;
         const photo seen = {product->shot, product->side, &image, &face, {&spots[0], &spots[1], &spots[2]},
@@ -275,6 +270,8 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, 
         memcpy(material->name, calibration->sample, sizeof material->name);
         material->thickness_mm = calibration->thickness_mm;
         material->refractive_index = calibration->refractive_index;
+        fitting->basis.finish = calibration->finish;
+        fitting->basis.own_sd = calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0;
         material->channels = calibration->channels;
         memcpy(material->channel_names, calibration->channel_names, sizeof material->channel_names);
         ok = observe_products(fitting, provenance, notes, calibration, error) && alb_fitting_run(fitting, error);

@@ -228,9 +228,9 @@ static void judge(alb_outcome *outcome, const alb_readings *readings, bool full_
                  alb_form_parameter_name(profile->form, which), profile->parameters[which], fitted->sd[which]);
     } else if (outcome->discrepancy_relative == 0 && which < n) {
         snprintf(why, ALB_REASON_SIZE, "%s", outcome->knowledge.parameters[which].because);
-    } else if (profile->parameters[1] * readings->outer_mm < 0.1) {
+    } else if (alb_profile_slowest(profile) * readings->outer_mm < 0.1) {
         snprintf(why, ALB_REASON_SIZE, "the slow term (%.3g per mm) does not decay within the readings (%.4g mm)",
-                 profile->parameters[1], readings->outer_mm);
+                 alb_profile_slowest(profile), readings->outer_mm);
     }
     outcome->fitted.identifiable = !*why;
 }
@@ -246,7 +246,8 @@ static void widen_intervals(alb_outcome *outcome, int n, alb_common_sd common, d
     alb_knowledge *knowledge = &outcome->knowledge;
     for (int p = 0; p < n; p++) {
         alb_certainty *certainty = &knowledge->parameters[p];
-        const double sd = p % 2 ? common.length : hypot(common.flux, 2 * common.length);
+        const alb_parameter *parameter = alb_form_parameter(outcome->fitted.profile.form, p);
+        const double sd = hypot(parameter->flux * common.flux, parameter->length * common.length);
         const double value = outcome->fitted.profile.parameters[p];
         certainty->lower = widened(certainty->lower, value, sd);
         certainty->upper = widened(certainty->upper, value, sd);
@@ -256,14 +257,16 @@ static void widen_intervals(alb_outcome *outcome, int n, alb_common_sd common, d
     knowledge->total.upper = widened(knowledge->total.upper, total, sd);
 }
 
-// What all readings share: amplitudes are flux / length^2, decays 1 / length.
+// What all readings share, by the powers in which parameters hold flux and length.
 static void add_common(alb_fitted *fitted, int n, alb_common_sd common)
 {
     const double *values = fitted->profile.parameters;
     for (int p = 0; p < n; p++)
         for (int q = 0; q < n; q++) {
-            const double flux = p % 2 || q % 2 ? 0 : common.flux * common.flux;
-            const double length = (p % 2 ? 1 : 2) * (q % 2 ? 1 : 2) * common.length * common.length;
+            const alb_parameter *one = alb_form_parameter(fitted->profile.form, p);
+            const alb_parameter *other = alb_form_parameter(fitted->profile.form, q);
+            const double flux = one->flux * other->flux * common.flux * common.flux;
+            const double length = one->length * other->length * common.length * common.length;
             fitted->covariance[p][q] += values[p] * values[q] * (flux + length);
         }
 }
