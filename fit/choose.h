@@ -27,6 +27,8 @@ typedef struct alb_outcome {
     double measured_share;       // share of the total within the readings
     double slope_per_mm, slope_sd, slope_from_mm, slope_to_mm; // d ln S / dr over the outer half of the readings
     alb_knowledge knowledge;
+    double free_total;  // before the energy was held (energy.h)
+    double energy_rise; // of chi-square, to hold it; of all sides of the channel
     char undecided[ALB_REASON_SIZE]; // why the data do not decide; empty where they do (fitted.identifiable)
 } alb_outcome;
 

@@ -15,6 +15,7 @@ typedef struct alb_measurement {
 typedef struct alb_fitting {
     alb_material
         material; // name, thickness_mm, refractive_index, channels and their names; fitted is filled by alb_fitting_run
+    bool absolute; // values are in units of the incident flux
     alb_measurement sides[ALB_SIDES][3];
     alb_properties_basis basis;   // common_sd is filled by alb_fitting_run
     alb_properties properties[3]; // filled by alb_fitting_run

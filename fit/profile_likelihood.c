@@ -23,7 +23,7 @@
 
 enum { FREE = ALB_PARAMETERS_MAX + 1, MATRIX = FREE * FREE };
 static const double constraint_sd = 1e-5, furthest = 25; // e^25 times the fit
-static const double bound_rise = 5.412;                  // 98 % for one degree of freedom
+static const double bound_rise = 6.635;                  // 99 % for one degree of freedom
 
 typedef struct hold {
     alb_quantity quantity;
@@ -448,14 +448,21 @@ alb_interval alb_likelihood_interval(alb_likelihood *l, alb_quantity quantity, d
                     : interval;
 }
 
+// Steps of at most 1 towards the value, then the value put right by what the reading that holds it misses it by.
 double alb_likelihood_hold(alb_profile *profile, alb_likelihood *l, alb_quantity quantity, double value)
 {
     point at = best_point(l, quantity);
-    const double target = log(fabs(value)), distance = target - at.held;
+    double direction[FREE], curvature, missed = 0;
+    const double target = log(fabs(value)), from = at.held, distance = target - from;
+    const double width = direction_of(direction, &curvature, &at, l, quantity) ? 1 / sqrt(curvature) : 1;
+    const double sd = 0.03 * fmin(width, 1);
     const int steps = (int)fmin(ceil(fabs(distance)), 100);
-    const double from = at.held;
     for (int s = 1; s <= steps; s++)
-        at = point_near(&at, l, quantity, from + distance * s / steps, 1e-6);
+        at = point_near(&at, l, quantity, from + distance * s / steps, sd);
+    for (int again = 0; again < 20 && fabs(target - at.held) > 1e-9; again++) {
+        missed += target - at.held;
+        at = point_near(&at, l, quantity, target + missed, sd);
+    }
     *profile = profile_at(l, at.u);
     return at.chi_square;
 }

@@ -266,6 +266,7 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, 
     bool ok = calibration && alb_path_join(path, folder, "calibration.json", error) &&
               alb_calibration_read(calibration, folder, error) && alb_provenance_add(provenance, path, error);
     if (ok) {
+        fitting->absolute = true;
         memcpy(material->name, calibration->sample, sizeof material->name);
         material->thickness_mm = calibration->thickness_mm;
         material->refractive_index = calibration->refractive_index;
