@@ -1,7 +1,7 @@
 // Readings of slabs as a camera would take them, from photons that share no formula with what is fitted: Monte Carlo
 // rings of a pencil beam, spread over an evenly lit disc and read on rings about its centre.
 #pragma once
-#include "base/random.h"
+#include "base/statistics.h"
 #include "capture/photon.h"
 #include "check.h"
 #include "fit/choose.h"
@@ -43,11 +43,11 @@ static const slab slabs[] = {
 };
 enum { SLABS = sizeof slabs / sizeof slabs[0] };
 
-static inline bool slabs_trace(alb_photon_tally *tally, const slab *slab, double more)
+static inline bool slabs_trace(alb_photon_tally *tally, const slab *body, double more)
 {
-    const alb_medium medium = {slab->absorption_per_mm, slab->reduced_scattering_per_mm / (1 - slab->anisotropy),
-                               slab->anisotropy, 1.5, slab->thickness_mm};
-    return alb_photon_trace(tally, &medium, slab->radius_mm, (long)(more * (double)slab->photons), 1, 1, NULL);
+    const alb_medium medium = {body->absorption_per_mm, body->reduced_scattering_per_mm / (1 - body->anisotropy),
+                               body->anisotropy, 1.5, body->thickness_mm};
+    return alb_photon_trace(tally, &medium, body->radius_mm, (long)(more * (double)body->photons), 1, 1, NULL);
 }
 
 // Share of a circle of radius rho about a point at distance r that lies in the disc of light.
@@ -79,6 +79,13 @@ static inline void slabs_thin(double *radius, double *light, const double *edges
         for (int j = 0; j < SLABS_PARTS; j++, k++)
             light[k] *= ring[i] / sum;
     }
+}
+
+// Relative sd that the photons give a reading.
+static inline double slabs_noise(const alb_readings *readings, int i)
+{
+    const double relative = readings->sd[i] / readings->value[i];
+    return sqrt(fmax(0, relative * relative - 1e-4));
 }
 
 // Readings of one face from 0 out to 1/3000 of that at the spot's edge (reflection) or the middle (transmission): rings
