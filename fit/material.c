@@ -60,7 +60,13 @@ static void put_attempts(alb_json *json, const alb_outcome *outcome)
             alb_json_number(json, "decay_ratio_held", ALB_TIED_RATIO);
         alb_json_number(json, "chi_square", attempt->chi_square);
         alb_json_integer(json, "degrees_of_freedom", attempt->degrees_of_freedom);
+        alb_json_number(json, "p_value", attempt->p_value);
         alb_json_number(json, "bic", attempt->bic);
+        alb_json_number(json, "bic_excess", attempt->bic_excess);
+        alb_json_number(json, "residual_lag_1", attempt->lag_1);
+        alb_json_number(json, "residual_lag_1_p_value", attempt->lag_1_p);
+        if (attempt->at_bound >= 0)
+            alb_json_string(json, "at_bound", alb_form_parameter_name(attempt->form, attempt->at_bound));
         alb_json_string(json, "rejected", attempt->rejected);
         alb_json_end_object(json);
     }

@@ -238,17 +238,22 @@ static void add_constraint(alb_likelihood *l, int plus, int minus, double scale,
     l->constraints[c].open = open;
 }
 
-// Order of the decays, S >= 0, and decays that the readings can show at all.
+// Order of the decays, S >= 0, and decays and depths that the readings can show at all.
 static void set_constraints(alb_likelihood *l)
 {
     const double outer = l->model.weighing->readings->outer_mm;
     const bool is_signed = l->candidate.form == ALB_FORM_SIGNED_EXPONENTIALS;
-    const int parameters = alb_candidate_parameters(l->candidate);
-    for (int p = 1; p < parameters; p += 2) {
-        add_constraint(l, p, -1, 1, log(0.01 / outer), true);
-        add_constraint(l, p, -1, -1, log(1e7 / outer), true);
-        if (p > 1)
-            add_constraint(l, p, p - 2, 1, is_signed ? log(ALB_TIED_RATIO) : 0, false);
+    int before = -1; // decay of the term before
+    for (int p = 0; p < alb_candidate_parameters(l->candidate); p++) {
+        const alb_parameter *parameter = alb_form_parameter(l->candidate.form, p);
+        if (parameter->flux || !parameter->length)
+            continue;
+        const bool decay = parameter->length < 0;
+        add_constraint(l, p, -1, 1, log(decay ? 0.01 / outer : 1e-5 * outer), true);
+        add_constraint(l, p, -1, -1, log(decay ? 1e7 / outer : 10 * outer), true);
+        if (decay && before >= 0 && alb_form_ordered(l->candidate.form))
+            add_constraint(l, p, before, 1, is_signed ? log(ALB_TIED_RATIO) : 0, false);
+        before = decay ? p : before;
     }
     if (is_signed)
         add_constraint(l, 0, 2, 1, 0, false);
