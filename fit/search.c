@@ -1,15 +1,15 @@
 // Weighted least squares of a form to the readings: min sum ((v_i - (W S)_i) / sd_i)^2.
 //
-// The best places of a grid (start.c) are polished by Levenberg-Marquardt (Ceres) in parameters that cannot break the
-// form:
+// The search is separable.c; from a place that is given, Levenberg-Marquardt (Ceres) in parameters that cannot break
+// the form:
 //   positive: ln a_j, ln b_j        signed: ln a1, ln b1, s = -a2/a1 in 0..1, ln(b2/b1 - 1), b2/b1 >= 1.1
 // Logarithms and whitening make the answer independent of the units. b1 < b2 < b3 in all.
 // Covariance: (J^T J)^-1 in the form's own parameters, J whitened, scaled to unit diagonal before it is inverted. It is
 // the linear approximation: too small where the decays come close (b2/b1 below about 1.5 at 1 % noise).
 #include "fit/search.h"
 #include "base/memory.h"
+#include "fit/separable.h"
 #include "fit/solve.h"
-#include "fit/start.h"
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
@@ -86,18 +86,23 @@ static void evaluate(double *residuals, double *jacobian, const double *u, const
     }
 }
 
-static void order_terms(alb_profile *profile)
+// Of the solver's parameters: amplitudes within e^40 of what the readings show, decays and depths by their range.
+static void bounds_of(double *lower, double *upper, alb_form form, const alb_weighing *weighing)
 {
-    double *p = profile->parameters;
-    const int terms = alb_form_term_count(profile->form);
-    if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS)
-        return; // in order by its bounds
-    for (int i = 1; i < terms; i++)
-        for (int j = i; j > 0 && p[2 * j + 1] < p[2 * j - 1]; j--) {
-            const double a = p[2 * j], b = p[2 * j + 1];
-            p[2 * j] = p[2 * j - 2], p[2 * j + 1] = p[2 * j - 1];
-            p[2 * j - 2] = a, p[2 * j - 1] = b;
-        }
+    const double outer = weighing->readings->outer_mm;
+    double top = 0;
+    for (int i = 0; i < weighing->readings->count; i++)
+        top = fmax(top, fabs(weighing->readings->value[i]));
+    for (int p = 0; p < alb_form_parameter_count(form); p++) {
+        const alb_parameter *parameter = alb_form_parameter(form, p);
+        const double amplitude = log(top) + (parameter->length + 2) * log(outer);
+        lower[p] = parameter->flux ? amplitude - 40 : parameter->length < 0 ? log(0.01 / outer) : log(1e-5 * outer);
+        upper[p] = parameter->flux ? amplitude + 40 : parameter->length < 0 ? log(1e7 / outer) : log(1e1 * outer);
+    }
+    if (form == ALB_FORM_SIGNED_EXPONENTIALS) {
+        lower[2] = 0, upper[2] = 1;
+        lower[3] = log(ALB_TIED_RATIO - 1), upper[3] = log(1e7);
+    }
 }
 
 bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate candidate, const alb_weighing *weighing,
@@ -106,56 +111,48 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate c
     search s = {.candidate = candidate};
     if (!alb_model_create(&s.model, weighing, error))
         return false;
-    double top = 0, u[PARAMETERS], lower[PARAMETERS], upper[PARAMETERS], chain[PARAMETERS][PARAMETERS];
-    for (int i = 0; i < weighing->readings->count; i++)
-        top = fmax(top, fabs(weighing->readings->value[i]));
+    double u[PARAMETERS], lower[PARAMETERS], upper[PARAMETERS], chain[PARAMETERS][PARAMETERS];
     solver_of(u, profile);
-    const double outer = weighing->readings->outer_mm;
-    for (int p = 0; p < PARAMETERS; p++) {
-        const bool amplitude = p % 2 == 0;
-        lower[p] = amplitude ? log(top) - 40 : log(0.01 / outer);
-        upper[p] = amplitude ? log(top) + 40 : log(1e7 / outer);
-    }
-    if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS) {
-        lower[2] = 0, upper[2] = 1;
-        lower[3] = log(ALB_TIED_RATIO - 1), upper[3] = log(1e7);
-    }
+    bounds_of(lower, upper, candidate.form, weighing);
     const int parameters = alb_candidate_parameters(candidate);
     for (int p = 0; p < parameters; p++)
         u[p] = fmin(fmax(u[p], lower[p]), upper[p]);
     const alb_problem problem = {parameters, alb_weighing_rows(weighing), evaluate, &s, lower, upper};
     const bool ok = alb_solve(u, chi_square, &problem, error);
     *profile = profile_of(chain, candidate, u);
-    order_terms(profile);
+    alb_profile_order(profile);
     alb_model_free(&s.model);
     return ok;
 }
 
+int alb_search_at_bound(const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing)
+{
+    double u[PARAMETERS], lower[PARAMETERS], upper[PARAMETERS];
+    solver_of(u, profile);
+    bounds_of(lower, upper, candidate.form, weighing);
+    for (int p = 0; p < alb_candidate_parameters(candidate); p++)
+        if (fmin(u[p] - lower[p], upper[p] - u[p]) < 1e-6 * (upper[p] - lower[p]))
+            return p;
+    return -1;
+}
+
+// Readings under a finite spot see interpolated columns in the search, so that its result is polished by the exact
+// ones.
 bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_candidate candidate, const alb_basis *basis,
                 const alb_weighing *weighing, alb_error *error)
 {
-    alb_start best[ALB_STARTS_MAX];
-    int count;
-    *found = false;
-    *chi_square = INFINITY;
-    if (!alb_starts_find(best, &count, candidate, basis, weighing, error))
+    alb_separable fit;
+    double *scratch = alb_allocate(alb_separable_scratch(basis), sizeof *scratch, error);
+    if (!scratch)
         return false;
-    for (int k = 0; k < count; k++) {
-        alb_profile tried = {.form = candidate.form};
-        double reached;
-        for (int j = 0; j < alb_form_term_count(candidate.form); j++) {
-            tried.parameters[2 * j] = best[k].amplitude[j];
-            tried.parameters[2 * j + 1] = basis->decay_per_mm[best[k].column[j]];
-        }
-        if (!alb_search_polish(&tried, &reached, candidate, weighing, error))
-            return false;
-        if (reached < *chi_square) {
-            *profile = tried;
-            *chi_square = reached;
-            *found = true;
-        }
-    }
-    return true;
+    alb_separable_fit(&fit, candidate, basis, weighing->readings->value, weighing->sd, weighing->energy_sd, scratch);
+    free(scratch);
+    *found = fit.found;
+    *chi_square = fit.chi_square;
+    if (!fit.found)
+        return true;
+    *profile = fit.profile;
+    return !basis->slope || alb_search_polish(profile, chi_square, candidate, weighing, error);
 }
 
 // Inverts a symmetric positive definite matrix of unit diagonal in place by Cholesky; false where a pivot, which is
@@ -188,6 +185,39 @@ static bool invert(double matrix[PARAMETERS][PARAMETERS], int n)
     return true;
 }
 
+bool alb_candidate_covariance(double covariance[PARAMETERS][PARAMETERS], double normal[PARAMETERS][PARAMETERS],
+                              alb_candidate candidate)
+{
+    const int n = alb_candidate_parameters(candidate), all = alb_form_parameter_count(candidate.form);
+    double matrix[PARAMETERS][PARAMETERS], scale[PARAMETERS];
+    memset(covariance, 0, sizeof(double[PARAMETERS][PARAMETERS]));
+    memcpy(matrix, normal, sizeof matrix);
+    if (candidate.tied) // b2 follows b1
+        for (int p = 0; p < n; p++) {
+            matrix[p][1] = normal[p][1] + ALB_TIED_RATIO * normal[p][3];
+            matrix[1][p] = matrix[p][1];
+        }
+    if (candidate.tied)
+        matrix[1][1] = normal[1][1] + ALB_TIED_RATIO * (2 * normal[1][3] + ALB_TIED_RATIO * normal[3][3]);
+    for (int p = 0; p < n; p++) {
+        scale[p] = sqrt(matrix[p][p]);
+        if (!(scale[p] > 0 && isfinite(scale[p])))
+            return false;
+    }
+    for (int p = 0; p < n; p++)
+        for (int q = 0; q < n; q++)
+            matrix[p][q] = matrix[p][q] / scale[p] / scale[q];
+    if (!invert(matrix, n))
+        return false;
+    for (int p = 0; p < all; p++)
+        for (int q = 0; q < all; q++) {
+            const int k = p < n ? p : 1, l = q < n ? q : 1;
+            const double follow = (p < n ? 1 : ALB_TIED_RATIO) * (q < n ? 1 : ALB_TIED_RATIO);
+            covariance[p][q] = follow * matrix[k][l] / scale[k] / scale[l];
+        }
+    return true;
+}
+
 bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX], bool *full_rank,
                            const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing,
                            alb_error *error)
@@ -196,38 +226,13 @@ bool alb_search_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_
     if (!alb_model_create(&m, weighing, error))
         return false;
     alb_model_evaluate(&m, profile);
-    const int all = alb_form_parameter_count(profile->form), n = alb_candidate_parameters(candidate);
-    const int rows = alb_weighing_rows(weighing);
-    // own[p][q]: derivative of the form's parameter p by the free parameter q (a1, b1, a2, and b2 where it is free)
-    double own[PARAMETERS][PARAMETERS] = {{0}}, matrix[PARAMETERS][PARAMETERS] = {{0}}, scale[PARAMETERS] = {0};
+    const int all = alb_form_parameter_count(profile->form), rows = alb_weighing_rows(weighing);
+    double normal[PARAMETERS][PARAMETERS] = {{0}};
     for (int p = 0; p < all; p++)
-        own[p][p] = p < n;
-    if (candidate.tied)
-        own[3][1] = ALB_TIED_RATIO;
-    for (int i = 0; i < rows; i++) {
-        double row[PARAMETERS] = {0};
-        for (int q = 0; q < n; q++)
-            for (int p = 0; p < all; p++)
-                row[q] += m.values[1 + p][i] * own[p][q];
-        for (int p = 0; p < n; p++)
-            for (int q = 0; q < n; q++)
-                matrix[p][q] += row[p] * row[q];
-    }
-    alb_model_free(&m);
-    *full_rank = true;
-    for (int p = 0; p < n; p++) {
-        scale[p] = sqrt(matrix[p][p]);
-        *full_rank &= scale[p] > 0 && isfinite(scale[p]);
-    }
-    for (int p = 0; *full_rank && p < n; p++)
-        for (int q = 0; q < n; q++)
-            matrix[p][q] = matrix[p][q] / scale[p] / scale[q];
-    *full_rank = *full_rank && invert(matrix, n);
-    memset(covariance, 0, sizeof(double[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX]));
-    for (int p = 0; *full_rank && p < all; p++)
         for (int q = 0; q < all; q++)
-            for (int k = 0; k < n; k++)
-                for (int l = 0; l < n; l++)
-                    covariance[p][q] += own[p][k] * own[q][l] * matrix[k][l] / scale[k] / scale[l];
+            for (int i = 0; i < rows; i++)
+                normal[p][q] += m.values[1 + p][i] * m.values[1 + q][i];
+    alb_model_free(&m);
+    *full_rank = alb_candidate_covariance(covariance, normal, candidate);
     return true;
 }
