@@ -124,11 +124,11 @@ static void examine(alb_fitting *fitting, bool absolute, alb_text *notes, alb_er
     }
 }
 
-static bool fit_request(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes, const request *r,
-                        alb_error *error)
+static bool fit_request(alb_fitting *fitting, alb_map *map, alb_provenance *provenance, alb_text *notes,
+                        const request *r, alb_error *error)
 {
     if (r->session)
-        return alb_fitting_from_session(fitting, provenance, notes, r->session, error);
+        return alb_fitting_from_session(fitting, map, provenance, notes, r->session, error);
     if (r->table) {
         snprintf(provenance->options, sizeof provenance->options, "--table %s --side %s", alb_path_name(r->table),
                  r->side);
@@ -144,11 +144,13 @@ static bool fit_request(alb_fitting *fitting, alb_provenance *provenance, alb_te
     return alb_fitting_from_images(fitting, provenance, notes, paths, r->mm_per_pixel, r->spot_radius_mm, error);
 }
 
-static bool write_results(const alb_fitting *fitting, const alb_provenance *provenance, const alb_text *notes,
-                          const request *r, alb_error *error)
+static bool write_results(const alb_fitting *fitting, const alb_map *map, const alb_provenance *provenance,
+                          const alb_text *notes, const request *r, alb_error *error)
 {
+    const char *said = notes->bytes ? notes->bytes : "";
     if (!alb_file_make_directory(r->out, error) ||
-        !alb_fitting_report(fitting, notes->bytes ? notes->bytes : "", r->out, error) ||
+        !(map->columns ? alb_map_write(map, fitting, provenance, said, r->out, error)
+                       : alb_fitting_report(fitting, said, r->out, error)) ||
         !alb_material_write(fitting, provenance, r->out, error))
         return false;
     if (r->as_json) {
@@ -183,19 +185,21 @@ static bool run(int argc, char **argv, alb_error *error)
     alb_provenance provenance = {.command = "fit"};
     alb_text notes = {0};
     alb_error failure = {0};
+    alb_map map = {0};
     alb_fitting *fitting = alb_allocate(1, sizeof *fitting, error);
-    bool ok = fitting && fit_request(fitting, &provenance, &notes, &r, error);
+    bool ok = fitting && fit_request(fitting, &map, &provenance, &notes, &r, error);
     if (ok) {
         examine(fitting, r.session != NULL, &notes, &failure);
         if (notes.bytes)
             fputs(notes.bytes, stderr);
-        ok = write_results(fitting, &provenance, &notes, &r, error);
+        ok = write_results(fitting, &map, &provenance, &notes, &r, error);
     }
     if (ok && failure.status != ALB_OK)
         ok = alb_fail(error, failure.status, "%s", failure.text);
     if (fitting)
         alb_fitting_free(fitting);
     free(fitting);
+    alb_map_free(&map);
     alb_text_free(&notes);
     return ok;
 }

@@ -33,5 +33,7 @@ bool alb_identify(bool *identifiable, char because[ALB_BECAUSE_SIZE], const alb_
 // energy_sd the sd of the measured energy. Fails only for want of memory.
 bool alb_outcome_complete(struct alb_outcome *outcome, alb_candidate candidate, const alb_weighing *weighing,
                           double energy_sd, struct alb_common_sd common, alb_error *error);
+// Adds to the covariance what all readings share, by the powers in which parameters hold flux and length.
+void alb_common_add(alb_fitted *fitted, struct alb_common_sd common);
 // sd of S(r), 1/mm^2, by the covariance; only for sums of exponentials.
 double alb_profile_sd(const alb_fitted *fitted, double r_mm);
