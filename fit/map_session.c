@@ -130,6 +130,18 @@ static bool light_about(alb_spot *spot, const lit *from, int i, alb_error *error
     return true;
 }
 
+// Drops the rings that the cut about the site leaves in part: light of neighbours is not the same all round them.
+static void keep_whole_rings(alb_readings *readings, const alb_site *site)
+{
+    const double whole_mm = site->reach_mm - hypot(readings->x_mm - site->x_mm, readings->y_mm - site->y_mm);
+    for (; readings->count > 1; readings->count--) {
+        const double r = readings->r_mm[readings->count - 1], half = 0.5 * (r - readings->r_mm[readings->count - 2]);
+        if (r + half <= whole_mm)
+            break;
+        readings->outer_mm = r - half;
+    }
+}
+
 static bool read_spot(alb_readings *readings, alb_operator *forward, int i, const void *context, alb_error *error)
 {
     const lit *from = context;
@@ -140,8 +152,11 @@ static bool read_spot(alb_readings *readings, alb_operator *forward, int i, cons
                       error))
         return false;
     const alb_channel cut = {&face, value, variance, from->channel->name};
-    const bool ok = alb_observe(readings, &cut, error) && light_about(&spot, from, i, error) &&
-                    alb_operator_create(forward, readings, &spot, error);
+    bool ok = alb_observe_whole(readings, &cut, error) && light_about(&spot, from, i, error);
+    if (ok) {
+        keep_whole_rings(readings, &from->sites[i]);
+        ok = alb_operator_create(forward, readings, &spot, error);
+    }
     alb_spot_free(&spot);
     alb_face_free(&face);
     free(value);
