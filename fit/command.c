@@ -70,6 +70,26 @@ static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
            outcome->slope_from_mm, outcome->slope_to_mm);
 }
 
+static void print_spread(const char *name, const alb_spread *spread, double wanted)
+{
+    printf("%16s%-10s %.5g +- %.2g  between spots %.2g  chi-square %.4g / %d  %s\n", "", name, spread->mean,
+           spread->mean_sd, spread->between, spread->chi_square, spread->count - 1,
+           spread->tail < wanted ? "DIFFERS" : "alike");
+}
+
+static void print_map(const alb_map *map, const alb_material *material)
+{
+    for (int side = 0; side < ALB_SIDES; side++)
+        for (int c = 0; c < material->channels && map->layers[side][c].spots; c++) {
+            const alb_map_layer *layer = &map->layers[side][c];
+            printf("%-12s %-2s %-19s %d of %d x %d spots\n", alb_side_names[side], material->channel_names[c],
+                   alb_form_name(layer->candidate.form), layer->total.count, map->columns, map->rows);
+            print_spread("total", &layer->total, map->tail_wanted);
+            print_spread("half in mm", &layer->half, map->tail_wanted);
+        }
+    printf("the sample is %s everywhere\n", map->heterogeneous ? "NOT ALIKE" : "alike");
+}
+
 static void note_border(const alb_fitting *fitting, alb_side side, alb_text *notes)
 {
     double complete_mm = INFINITY;
@@ -158,6 +178,10 @@ static bool write_results(const alb_fitting *fitting, const alb_map *map, const 
         alb_json_begin(&json, provenance);
         alb_material_put(&json, fitting);
         return alb_json_print(&json, error);
+    }
+    if (map->columns) {
+        print_map(map, &fitting->material);
+        return true;
     }
     for (int side = 0; side < ALB_SIDES; side++)
         for (int c = 0; c < fitting->material.channels; c++)

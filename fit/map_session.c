@@ -4,7 +4,8 @@
 // centre (one shape for all, averaged: the projector's) and which share w_i of the flux it has. A spot's readings end
 // half way to its nearest neighbour and are divided by its share. What its neighbours add is in the forward model: the
 // mean over a circle of radius r about the spot of light that entered at distance D is the mean over a circle of radius
-// D of light that leaves at r, so that a neighbour is a sample of the spot at distance D_ij with the share w_j / w_i.
+// D of light that leaves at r, so that a neighbour is a sample of the spot at distance D_ij with the share w_j / w_i;
+// of sd s along each axis, two samples of half the share at D_ij + s^2 / (2 D_ij) +- s, true to second order in s.
 // Stops being true where neighbours differ so much that a spot's own profile is not theirs, seen through the share of
 // their light there.
 //
@@ -19,7 +20,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SHAPE_BINS = 32 };
+enum { SHAPE_BINS = 20 };
 
 // The grid on the white reference.
 typedef struct lamp {
@@ -27,6 +28,7 @@ typedef struct lamp {
     alb_site *sites;
     double *flux[3], flux_sd[3]; // shares of the flux; mean relative sd of one
     double shape_r_mm[3][SHAPE_BINS], shape_share[3][SHAPE_BINS];
+    double shape_sd_mm[3]; // along one axis
 } lamp;
 
 static void lamp_free(lamp *out)
@@ -40,9 +42,7 @@ static void lamp_free(lamp *out)
 // Share of the flux of each spot, and the mean shape.
 static bool measure_lamp(lamp *out, int channel, const alb_channel *white, alb_error *error)
 {
-    double weights[SHAPE_BINS] = {0}, distances[SHAPE_BINS] = {0}, reach = 0;
-    for (int i = 0; i < out->count; i++)
-        reach = fmax(reach, out->sites[i].reach_mm);
+    double weights[SHAPE_BINS] = {0}, distances[SHAPE_BINS] = {0}, extent_mm = 0;
     for (int i = 0; i < out->count; i++) {
         alb_face face;
         double *value, *variance, flux = 0, flux_variance = 0;
@@ -56,8 +56,10 @@ static bool measure_lamp(lamp *out, int channel, const alb_channel *white, alb_e
         alb_channel cut = {&face, value, variance, white->name};
         alb_spot spot = {0};
         const bool ok = alb_spot_measure(&spot, &cut, error);
+        if (ok && i == 0)
+            extent_mm = spot.r_mm[spot.count - 1];
         for (int k = 0; k < spot.count; k++) {
-            const int bin = (int)fmin(spot.r_mm[k] / reach * SHAPE_BINS, SHAPE_BINS - 1);
+            const int bin = (int)fmin(spot.r_mm[k] / extent_mm * SHAPE_BINS, SHAPE_BINS - 1);
             out->shape_share[channel][bin] += spot.share[k] / out->count;
             weights[bin] += spot.share[k] != 0;
             distances[bin] += spot.share[k] != 0 ? spot.r_mm[k] : 0;
@@ -71,8 +73,12 @@ static bool measure_lamp(lamp *out, int channel, const alb_channel *white, alb_e
         out->flux[channel][i] = flux;
         out->flux_sd[channel] += sqrt(flux_variance) / flux / out->count;
     }
-    for (int b = 0; b < SHAPE_BINS; b++)
+    double square = 0;
+    for (int b = 0; b < SHAPE_BINS; b++) {
         out->shape_r_mm[channel][b] = weights[b] > 0 ? distances[b] / weights[b] : 0;
+        square += out->shape_share[channel][b] * out->shape_r_mm[channel][b] * out->shape_r_mm[channel][b];
+    }
+    out->shape_sd_mm[channel] = sqrt(fmax(square, 0) / 2);
     return true;
 }
 
@@ -110,22 +116,29 @@ typedef struct lit {
     int colour;
 } lit;
 
-// The light that enters at and about spot i, in units of its own.
-static bool light_about(alb_spot *spot, const lit *from, int i, alb_error *error)
+// The light that enters about (x, y), where the readings of spot i have their centre, in units of its own. Off its site
+// by e the spot's own light lies at sqrt(r^2 + e^2).
+static bool light_about(alb_spot *spot, const lit *from, int i, double x_mm, double y_mm, alb_error *error)
 {
     const lamp *light = from->light;
-    const int count = SHAPE_BINS + light->count - 1;
+    const int count = SHAPE_BINS + 2 * (light->count - 1);
+    const double sd = light->shape_sd_mm[from->colour];
     *spot = (alb_spot){.count = count,
                        .r_mm = alb_allocate((size_t)count, sizeof(double), error),
                        .share = alb_allocate((size_t)count, sizeof(double), error)};
     if (!spot->r_mm || !spot->share)
         return false;
-    memcpy(spot->r_mm, light->shape_r_mm[from->colour], SHAPE_BINS * sizeof(double));
+    const double off = hypot(x_mm - from->sites[i].x_mm, y_mm - from->sites[i].y_mm);
+    for (int b = 0; b < SHAPE_BINS; b++)
+        spot->r_mm[b] = hypot(light->shape_r_mm[from->colour][b], off);
     memcpy(spot->share, light->shape_share[from->colour], SHAPE_BINS * sizeof(double));
     for (int j = 0, k = SHAPE_BINS; j < light->count; j++)
         if (j != i) {
-            spot->r_mm[k] = hypot(from->sites[i].x_mm - from->sites[j].x_mm, from->sites[i].y_mm - from->sites[j].y_mm);
-            spot->share[k++] = light->flux[from->colour][j] / light->flux[from->colour][i];
+            const double distance = hypot(x_mm - from->sites[j].x_mm, y_mm - from->sites[j].y_mm);
+            for (int sign = -1; sign <= 1; sign += 2, k++) {
+                spot->r_mm[k] = distance + sd * sd / (2 * distance) + sign * sd;
+                spot->share[k] = 0.5 * light->flux[from->colour][j] / light->flux[from->colour][i];
+            }
         }
     return true;
 }
@@ -152,7 +165,8 @@ static bool read_spot(alb_readings *readings, alb_operator *forward, int i, cons
                       error))
         return false;
     const alb_channel cut = {&face, value, variance, from->channel->name};
-    bool ok = alb_observe_whole(readings, &cut, error) && light_about(&spot, from, i, error);
+    bool ok =
+        alb_observe_whole(readings, &cut, error) && light_about(&spot, from, i, readings->x_mm, readings->y_mm, error);
     if (ok) {
         keep_whole_rings(readings, &from->sites[i]);
         ok = alb_operator_create(forward, readings, &spot, error);
@@ -227,8 +241,11 @@ static bool fit_side(alb_map *map, alb_fitting *fitting, const lamp *light, alb_
         bool ok = alb_plane_take(&plane, image, calibration->channel_names[c], factor, INFINITY, error);
         const alb_channel channel = {face, plane.value, plane.variance, name};
         const lit from = {light, map->sites[side], &channel, c};
-        if (ok && c == 0 && side == ALB_TRANSMISSION)
+        if (ok && c == 0 && side == ALB_TRANSMISSION) {
             ok = alb_sites_find(map->sites[side], map->columns, map->rows, true, &channel, error);
+            if (ok)
+                alb_sites_align(map->sites[side], light->sites, light->count);
+        }
         alb_map_layer *layer = &map->layers[side][c];
         ok = ok && alb_map_layer_fit(layer, light->count, light->flux_sd[c], read_spot, &from, name, error);
         alb_plane_free(&plane);

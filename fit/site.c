@@ -136,6 +136,27 @@ done:
     return ok;
 }
 
+// Least squares: theta = atan2(sum k x s, sum k . s) about the centroids.
+void alb_sites_align(alb_site *seen, const alb_site *known, int count)
+{
+    double from[2] = {0}, to[2] = {0}, dot = 0, cross = 0;
+    for (int i = 0; i < count; i++) {
+        from[0] -= known[i].x_mm / count, from[1] += known[i].y_mm / count;
+        to[0] += seen[i].x_mm / count, to[1] += seen[i].y_mm / count;
+    }
+    for (int i = 0; i < count; i++) {
+        const double kx = -known[i].x_mm - from[0], ky = known[i].y_mm - from[1];
+        const double sx = seen[i].x_mm - to[0], sy = seen[i].y_mm - to[1];
+        dot += kx * sx + ky * sy;
+        cross += kx * sy - ky * sx;
+    }
+    const double angle = atan2(cross, dot), c = cos(angle), s = sin(angle);
+    for (int i = 0; i < count; i++) {
+        const double kx = -known[i].x_mm - from[0], ky = known[i].y_mm - from[1];
+        seen[i] = (alb_site){to[0] + c * kx - s * ky, to[1] + s * kx + c * ky, known[i].reach_mm};
+    }
+}
+
 // The rows and columns of the face that hold its pixels within the reach of the site: first column and row, last column
 // and row.
 static void bounding_box(int box[4], const alb_site *site, const alb_face *face)

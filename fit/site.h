@@ -13,6 +13,11 @@ typedef struct alb_site {
 bool alb_sites_find(alb_site *sites, int columns, int rows, bool mirrored, const alb_channel *channel,
                     alb_error *error);
 
+// Puts the sites seen on the far face where the known ones of the near face are, mirrored, turned and shifted as a
+// whole so that they lie best on those seen: light that has spread through the slab and over its neighbours' moves
+// each, all together but little.
+void alb_sites_align(alb_site *seen, const alb_site *known, int count);
+
 // The part of a face and of a channel on it within the site's reach; everything else NaN, values times `factor`.
 // Free the face with alb_face_free, value and variance with free().
 bool alb_site_cut(alb_face *face, double **value, double **variance, const alb_site *site, double factor,
