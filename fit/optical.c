@@ -271,13 +271,19 @@ static bool check_totals(const alb_measured_totals *m, double entry, alb_error *
     return true;
 }
 
+// ln of the share that a half-space of sigma_a / sigma_s' = e^x loses, less log_lost.
+static double half_space_residual(const alb_streams *streams, double entry, double log_lost, double x)
+{
+    return log(entry - alb_adding_doubling(streams, exp(x), 1, 0).reflection) - log_lost;
+}
+
 // ln(sigma_a / sigma_s') at which a half-space loses the share exp(log_lost); false position with halved ends
 // (Illinois) in [low, high], in which the share rises.
 static double half_space_at(const alb_streams *streams, double entry, double log_lost, double low, double high)
 {
     double at_low = -HUGE_VAL, at_high = HUGE_VAL, x = (low + high) / 2;
     for (int i = 0, side = 0; i < 100; i++) {
-        const double f = log(entry - alb_adding_doubling(streams, exp(x), 1, 0).reflection) - log_lost;
+        const double f = half_space_residual(streams, entry, log_lost, x);
         if (fabs(f) < 1e-9 || high - low < 1e-12)
             break;
         if (f < 0) {
@@ -294,6 +300,20 @@ static double half_space_at(const alb_streams *streams, double entry, double log
     return x;
 }
 
+// The same on other streams from a solution nearby: secants, the first of the given slope.
+static double half_space_near(const alb_streams *streams, double entry, double log_lost, double x, double slope)
+{
+    double f = half_space_residual(streams, entry, log_lost, x);
+    for (int i = 0; i < 12 && fabs(f) > 1e-9; i++) {
+        const double step = -f / slope, next = half_space_residual(streams, entry, log_lost, x + step);
+        if (!(fabs(next) < fabs(f)))
+            break;
+        slope = (next - f) / step;
+        x += step, f = next;
+    }
+    return fabs(f) < 1e-6 ? x : half_space_at(streams, entry, log_lost, -40, 12);
+}
+
 static bool half_space(alb_optical *out, const alb_optical_model *model, double entry,
                        const alb_measured_totals *measured)
 {
@@ -305,11 +325,11 @@ static bool half_space(alb_optical *out, const alb_optical_model *model, double 
     out->flags = ALB_OPTICAL_RATIO_ONLY | (lost > 2 * sd ? 0 : ALB_OPTICAL_NO_ABSORPTION);
     out->reduced_albedo = 1;
     if (lost > 1e-9) {
-        const double log_lost = log(lost), few = half_space_at(&model->coarse, entry, log_lost, -40, 12),
-                     x = half_space_at(&model->fine, entry, log_lost, few - 1, few + 1), h = 1e-4;
-        const double up = log(entry - alb_adding_doubling(&model->coarse, exp(x + h), 1, 0).reflection),
-                     down = log(entry - alb_adding_doubling(&model->coarse, exp(x - h), 1, 0).reflection);
-        const double ratio = exp(x), slope = (up - down) / (2 * h);
+        const double log_lost = log(lost), few = half_space_at(&model->coarse, entry, log_lost, -40, 12), h = 1e-3;
+        const double slope = (half_space_residual(&model->coarse, entry, log_lost, few + h) -
+                              half_space_residual(&model->coarse, entry, log_lost, few - h)) /
+                             (2 * h);
+        const double ratio = exp(half_space_near(&model->fine, entry, log_lost, few, slope));
         out->reduced_albedo = 1 / (1 + ratio);
         out->reduced_albedo_sd = ratio / ((1 + ratio) * (1 + ratio)) * sd / lost / slope;
     } else { // lost grows as the root of the ratio: what an sd would be lost by

@@ -121,6 +121,7 @@ static void session_gives_totals(void **state)
     alb_provenance provenance = {.command = "fit"};
     alb_text notes = {0};
     alb_fitting *fitting = calloc(1, sizeof *fitting);
+    alb_map map = {0};
     make_session();
     check_ok(alb_fitting_from_session(fitting, &map, &provenance, &notes, "s", &error), &error);
     for (int side = 0; side < ALB_SIDES; side++) {
@@ -186,6 +187,7 @@ static void what_is_missing_is_named(void **state)
     alb_provenance provenance = {.command = "fit"};
     alb_text notes = {0};
     alb_fitting *fitting = calloc(1, sizeof *fitting);
+    alb_map map = {0};
     make_session();
     remove(files[2]);
     check_fails(alb_fitting_from_session(fitting, &map, &provenance, &notes, "s", &error), &error, ALB_ACCESS,
