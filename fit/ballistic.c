@@ -12,7 +12,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double core_relative_sd = 0.1, narrow = 5; // narrow: decays times the reach of the spot
+static const double core_relative_sd = 0.1, narrow = 3; // narrow: decays times the reach of the spot
 
 // How many of the first readings the spot reaches: where the share of distances within a quarter of the first spacing
 // is a hundredth of the largest at least.

@@ -38,7 +38,7 @@ static const slab slabs[] = {
     {"thin 2 mm", 0.01, 0.5, 0, 2, 19, 1000000},
     {"thin 5 mm", 0.01, 0.5, 0, 5, 25, 1000000},
     {"thin 5 mm g 0.9", 0.01, 0.5, 0.9, 5, 25, 200000},
-    {"dark 5 mm", 0.4, 1.0, 0, 5, 8.5, 1000000},
+    {"dark 5 mm", 0.4, 1.0, 0, 5, 8.5, 6000000},
     {"dark half-space", 0.4, 1.0, 0, 200, 6, 1000000},
 };
 enum { SLABS = sizeof slabs / sizeof slabs[0] };
@@ -86,6 +86,12 @@ static inline double slabs_noise(const alb_readings *readings, int i)
 {
     const double relative = readings->sd[i] / readings->value[i];
     return sqrt(fmax(0, relative * relative - 1e-4));
+}
+
+// Whether enough light left through the face for its rings to be worth a fit.
+static inline bool slabs_seen(const alb_photon_tally *tally, const slab *body, double more, alb_side side)
+{
+    return (tally->leaving[side] - tally->unscattered[side]) * more * (double)body->photons > 4e4;
 }
 
 // Readings of one face from 0 out to 1/3000 of that at the spot's edge (reflection) or the middle (transmission): rings

@@ -6,13 +6,14 @@
 #include "slabs.h"
 #include <unistd.h>
 
+enum { MORE = 4 }; // photons, of those of the table
 static alb_photon_tally tallies[SLABS];
 
 static int trace_all(void **state)
 {
     (void)state;
     for (int s = 0; s < SLABS; s++)
-        if (!slabs_trace(&tallies[s], &slabs[s], 4))
+        if (!slabs_trace(&tallies[s], &slabs[s], MORE))
             return 1;
     return 0;
 }
@@ -31,23 +32,22 @@ static void fit_slab(alb_outcome *outcome, alb_readings *readings, alb_operator 
     alb_spot_free(&spot);
 }
 
-// Relative rms of what a profile leaves over the readings whose photon noise is below 2 %, less that noise.
-static double rms_of(const alb_readings *readings, const alb_operator *forward, const alb_profile *profile)
+// Relative rms of what a profile leaves over the readings whose photon noise is below 1 %, that noise included.
+static double rms_of(int *counted, const alb_readings *readings, const alb_operator *forward,
+                     const alb_profile *profile)
 {
     alb_error error = {0};
-    double *model = alb_operator_readings(forward, profile, &error), squares = 0, noise = 0;
-    int counted = 0;
+    double *model = alb_operator_readings(forward, profile, &error), squares = 0;
+    *counted = 0;
     assert_non_null(model);
     for (int i = 0; i < readings->count; i++) {
-        const double photons = slabs_noise(readings, i);
-        if (photons > 0.02)
+        if (slabs_noise(readings, i) > 0.01)
             continue;
         squares += pow(readings->value[i] / model[i] - 1, 2);
-        noise += photons * photons;
-        counted++;
+        (*counted)++;
     }
     free(model);
-    return sqrt(fmax(0, squares - noise) / counted);
+    return sqrt(squares / fmax(*counted, 1));
 }
 
 typedef struct summary {
@@ -61,17 +61,19 @@ static void check_side(alb_side side, double median_rms, double worst_rms)
     double worst = 0, worst_total = 0;
     alb_outcome *outcome = calloc(1, sizeof *outcome);
     for (int s = 0; s < SLABS; s++) {
-        if (tallies[s].leaving[side] - tallies[s].unscattered[side] < 1e-3)
+        if (!slabs_seen(&tallies[s], &slabs[s], MORE, side))
             continue;
+        int counted;
         alb_readings readings = {0};
         alb_operator forward = {0};
         fit_slab(outcome, &readings, &forward, s, side, false);
         const double truth = tallies[s].leaving[side] - tallies[s].unscattered[side];
-        const double rms = rms_of(&readings, &forward, &outcome->fitted.profile);
+        const double rms = rms_of(&counted, &readings, &forward, &outcome->fitted.profile);
         const double error = outcome->fitted.total / truth - 1;
-        print_message("%-18s %s %-24s%s %d parameters, rms %.2f %%, total %+.2f %%\n", slabs[s].name, side ? "T" : "R",
-                      alb_form_name(outcome->fitted.profile.form), outcome->tied ? ", tied" : "",
-                      alb_form_parameter_count(outcome->fitted.profile.form) - outcome->tied, 100 * rms, 100 * error);
+        print_message("%-18s %s %-24s%s %d parameters, rms %.2f %% of %d readings, total %+.2f %%\n", slabs[s].name,
+                      side ? "T" : "R", alb_form_name(outcome->fitted.profile.form), outcome->tied ? ", tied" : "",
+                      alb_form_parameter_count(outcome->fitted.profile.form) - outcome->tied, 100 * rms, counted,
+                      100 * error);
         worst = fmax(worst, rms);
         worst_total = fmax(worst_total, fabs(error));
         all.rms[all.count] = rms;
@@ -108,13 +110,14 @@ static void flat_top_T(void **state)
     alb_outcome *outcome = calloc(1, sizeof *outcome);
     for (int s = 0; s < SLABS; s++) {
         const double paths = (slabs[s].absorption_per_mm + slabs[s].reduced_scattering_per_mm) * slabs[s].thickness_mm;
-        if (paths < 12 || tallies[s].leaving[ALB_TRANSMISSION] < 1e-3)
+        if (paths < 12 || !slabs_seen(&tallies[s], &slabs[s], MORE, ALB_TRANSMISSION))
             continue;
+        int counted;
         alb_readings readings = {0};
         alb_operator forward = {0};
         fit_slab(outcome, &readings, &forward, s, ALB_TRANSMISSION, false);
         const alb_form form = outcome->fitted.profile.form;
-        const double rms = rms_of(&readings, &forward, &outcome->fitted.profile);
+        const double rms = rms_of(&counted, &readings, &forward, &outcome->fitted.profile);
         print_message("%s: %s, rms %.2f %%\n", slabs[s].name, alb_form_name(form), 100 * rms);
         assert_true(form == ALB_FORM_SIGNED_EXPONENTIALS || form == ALB_FORM_BURIED_SOURCE ||
                     form == ALB_FORM_TWO_BURIED_SOURCES);
@@ -138,7 +141,7 @@ static void ballistic_spike(void **state)
         const double truth = tallies[s].unscattered[ALB_TRANSMISSION];
         alb_readings readings = {0};
         alb_operator forward = {0};
-        if (tallies[s].leaving[ALB_TRANSMISSION] < 1e-3)
+        if (!slabs_seen(&tallies[s], &slabs[s], MORE, ALB_TRANSMISSION))
             continue;
         fit_slab(outcome, &readings, &forward, s, ALB_TRANSMISSION, true);
         if (truth < 1e-3) { // nothing straight: nothing found that matters
