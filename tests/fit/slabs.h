@@ -3,9 +3,8 @@
 #pragma once
 #include "base/statistics.h"
 #include "capture/photon.h"
-#include "check.h"
 #include "fit/choose.h"
-#include <string.h>
+#include <math.h>
 
 enum { SLABS_RINGS_MAX = 64, SLABS_PARTS = 24 };
 static const double slabs_spot_mm = 0.5, slabs_range = 3000;
@@ -97,16 +96,16 @@ static inline bool slabs_seen(const alb_photon_tally *tally, const slab *body, d
 // Readings of one face from 0 out to 1/3000 of that at the spot's edge (reflection) or the middle (transmission): rings
 // 0.1 mm wide to 1 mm, then growing by a sixteenth; sd 1 % and that of the photons. What has not scattered is left out
 // where `ballistic` is false (a camera would mask it), and is in the lit rings where it is true.
-static inline void slabs_readings(alb_readings *readings, const alb_photon_tally *tally, alb_side side, bool ballistic)
+static inline bool slabs_readings(alb_readings *readings, const alb_photon_tally *tally, alb_side side, bool ballistic)
 {
     enum { THIN = ALB_PHOTON_BINS * SLABS_PARTS };
     static double radius[THIN], light[THIN];
     double edge[SLABS_RINGS_MAX + 1], reference = 0;
-    alb_error error = {0};
     slabs_thin(radius, light, tally->edges_mm, tally->ring[side]);
     for (int i = 0; i <= SLABS_RINGS_MAX; i++)
         edge[i] = i <= 10 ? 0.1 * i : pow(1.0625, i - 10);
-    check_ok(alb_readings_create(readings, SLABS_RINGS_MAX, &error), &error);
+    if (!alb_readings_create(readings, SLABS_RINGS_MAX, NULL))
+        return false;
     int n = 0;
     for (; n < SLABS_RINGS_MAX && edge[n + 1] + slabs_spot_mm < tally->edges_mm[ALB_PHOTON_BINS]; n++) {
         double value = 0, r_mean = 0, area = 0;
@@ -139,4 +138,5 @@ static inline void slabs_readings(alb_readings *readings, const alb_photon_tally
     }
     readings->count = n;
     readings->outer_mm = readings->complete_mm = edge[n];
+    return true;
 }
