@@ -15,16 +15,11 @@
 // Stops being true for slabs so thin that light leaves behind, for alpha' below 0.8, where diffusion no longer holds,
 // and within a mean free path of the beam.
 #include "fit/appearance.h"
+#include "base/record.h"
 #include <math.h>
 
 enum { QUANTILES = 180, STEPS = 80 };
 static const double index_where_unknown = 1.5;
-
-double alb_burley_value(alb_burley burley, double r_mm)
-{
-    const double d = burley.length_mm;
-    return burley.albedo * (exp(-r_mm / d) + exp(-r_mm / (3 * d))) / (8 * M_PI * d * r_mm);
-}
 
 double alb_burley_beam_ratio(double albedo)
 {
@@ -77,6 +72,11 @@ double alb_albedo_invert(double total, double refractive_index)
     return invert(dipole_total, refractive_index, total);
 }
 
+static bool is_dipole(const alb_profile *profile)
+{
+    return profile->form == ALB_FORM_DIPOLE || profile->form == ALB_FORM_BETTER_DIPOLE;
+}
+
 // Distances within which 5 to 95 % of the light of the profile leaves, evenly spaced in light.
 static void light_quantiles(double r_mm[QUANTILES], const alb_profile *profile)
 {
@@ -103,9 +103,10 @@ static double mean_square_deviation(double *largest, alb_burley burley, const al
                                     const double r_mm[QUANTILES])
 {
     double sum = 0;
+    const alb_profile approximation = {ALB_FORM_BURLEY, {burley.albedo, burley.length_mm}};
     *largest = 0;
     for (int i = 0; i < QUANTILES; i++) {
-        const double x = log(alb_burley_value(burley, r_mm[i]) / alb_profile_value(profile, r_mm[i]));
+        const double x = log(alb_profile_value(&approximation, r_mm[i]) / alb_profile_value(profile, r_mm[i]));
         sum += x * x;
         *largest = fmax(*largest, fabs(x));
     }
@@ -141,14 +142,18 @@ static void fit_black(alb_appearance_channel *out, const alb_profile *profile)
     out->burley.length_mm = 1 / (alb_burley_beam_ratio(0) * (profile->parameters[0] + profile->parameters[1]));
 }
 
-static void take_medium(alb_appearance_channel *out, const alb_profile *profile, double refractive_index)
+static void take_medium(alb_appearance_channel *out, const alb_profile *profile, double absorption_per_mm,
+                        double reduced_scattering_per_mm, double refractive_index)
 {
-    if (profile->form == ALB_FORM_DIPOLE) {
-        out->medium_source = ALB_MEDIUM_MEASURED;
+    out->medium_source = ALB_MEDIUM_MEASURED;
+    out->absorption_per_mm = absorption_per_mm;
+    out->reduced_scattering_per_mm = reduced_scattering_per_mm;
+    if (is_dipole(profile)) {
         out->absorption_per_mm = profile->parameters[0];
         out->reduced_scattering_per_mm = profile->parameters[1];
-        return;
     }
+    if (out->absorption_per_mm + out->reduced_scattering_per_mm > 0)
+        return;
     const double albedo = alb_albedo_invert(out->burley.albedo, refractive_index);
     const double path_mm = alb_burley_beam_ratio(out->burley.albedo) * out->burley.length_mm;
     out->medium_source = ALB_MEDIUM_INVERTED;
@@ -156,12 +161,40 @@ static void take_medium(alb_appearance_channel *out, const alb_profile *profile,
     out->reduced_scattering_per_mm = albedo / path_mm;
 }
 
-bool alb_appearance_derive(alb_appearance *appearance, const alb_material *material, alb_error *error)
+static bool read_medium(alb_media *media, int c, alb_node channel, alb_error *error)
+{
+    alb_node properties, absorption, scattering;
+    if (!alb_node_has(channel, "optical_properties"))
+        return true;
+    if (!alb_node_object(&properties, channel, "optical_properties", error))
+        return false;
+    return alb_node_has(properties, "refused") ||
+           (alb_node_object(&absorption, properties, "absorption_per_mm", error) &&
+            alb_node_object(&scattering, properties, "reduced_scattering_per_mm", error) &&
+            alb_node_number(&media->absorption_per_mm[c], absorption, "value", 0, 1e300, error) &&
+            alb_node_number(&media->reduced_scattering_per_mm[c], scattering, "value", 0, 1e300, error));
+}
+
+bool alb_media_read(alb_media *media, const char *path, alb_error *error)
+{
+    alb_node root, channels, channel;
+    alb_record *record = alb_record_read(path, error);
+    *media = (alb_media){{0}, {0}};
+    bool ok = record && alb_record_root(&root, record, error) && alb_node_object(&channels, root, "channels", error);
+    for (size_t c = 0; ok && c < alb_node_key_count(channels) && c < 3; c++)
+        ok = alb_node_object(&channel, channels, alb_node_key(channels, c), error) &&
+             read_medium(media, (int)c, channel, error);
+    alb_record_free(record);
+    return ok;
+}
+
+bool alb_appearance_derive(alb_appearance *appearance, const alb_material *material, const alb_media *media,
+                           alb_error *error)
 {
     *appearance = (alb_appearance){
         .material = material, .refractive_index = material->refractive_index, .channels = material->channels};
     for (int c = 0; c < material->channels; c++)
-        if (material->fitted[ALB_REFLECTION][c].profile.form == ALB_FORM_DIPOLE)
+        if (is_dipole(&material->fitted[ALB_REFLECTION][c].profile))
             appearance->refractive_index = material->fitted[ALB_REFLECTION][c].profile.parameters[2];
     if (!(appearance->refractive_index > 0)) {
         appearance->refractive_index = index_where_unknown;
@@ -174,7 +207,7 @@ bool alb_appearance_derive(alb_appearance *appearance, const alb_material *mater
             return alb_fail(error, ALB_BAD_DATA,
                             "%s: channel %s has no reflection, which a renderer wants; csv takes either side",
                             material->name, material->channel_names[c]);
-        const bool black = reflection->profile.form == ALB_FORM_DIPOLE && reflection->profile.parameters[0] > 0;
+        const bool black = is_dipole(&reflection->profile) && reflection->profile.parameters[0] > 0;
         if (!(black || reflection->total > 0) || !(reflection->total <= 1 + 1e-9))
             return alb_fail(error, ALB_BAD_DATA,
                             "%s: channel %s reflects %.4g of the light, which no renderer takes: fit a calibrated "
@@ -186,7 +219,8 @@ bool alb_appearance_derive(alb_appearance *appearance, const alb_material *mater
             fit_burley(out, &reflection->profile);
         else
             fit_black(out, &reflection->profile);
-        take_medium(out, &reflection->profile, appearance->refractive_index);
+        take_medium(out, &reflection->profile, media->absorption_per_mm[c], media->reduced_scattering_per_mm[c],
+                    appearance->refractive_index);
     }
     return true;
 }
