@@ -2,16 +2,17 @@
 // form, from no start values. The reduced problem is reduced.c's.
 //
 // 1. The best single exponential, b_0: the gain in chi^2 of one column is known on a grid of decays; from its peaks.
-// 2. Positive terms: non-negative least squares over the grid (convex: one minimum; Lawson & Hanson 1974, ch. 23) finds
-//    few columns, mostly pairs of neighbours around the decays of the data. Every cut of them into as many groups as
-//    terms are wanted gives a start, the groups' mean ln b.
-//    More terms than one can lower chi^2 only if r.c(b) > 0 somewhere (Lindsay 1983). Where no start leads below b_0
-//    but that holds, the search starts from b_0 and the b of the largest r.c(b); or, where it holds only next to b_0,
-//    r.s(b_0) > 0, from two close ones.
+// 2. Positive terms: non-negative least squares over the grid (measure.c) finds few columns, mostly pairs of neighbours
+//    around the decays of the data. Every cut of them into as many groups as terms are wanted gives a start, the
+//    groups' mean ln b.
 // 3. Signed pairs: all pairs of the grid and b_0 are solved; those peaks of the table that beat the single exponential
 //    start a descent, and so does the best tied pair.
+// 4. A second term that gains little has rivals: then also from b_0 and each peak of what a second column gains.
 //
-// All of it on readings of which neighbours are merged; what is left, one place mostly, is polished on all readings.
+// 1 to 3 on readings of which neighbours are merged; what is left, one place mostly, is polished on all readings.
+// The best minimum in all but one of 6000 random profiles, noise 0.1 to 10 %, decays 1 : 1.1 to 10 (tests). Stops being
+// true where decays of the truth lie closer than the grid and the readings still tell them apart by more than two
+// terms.
 #include "fit/separable.h"
 #include "fit/measure.h"
 #include "fit/reduced.h"
@@ -20,6 +21,9 @@
 #include <string.h>
 
 enum { TERMS = ALB_TERMS_MAX, STARTS = 8 };
+
+// A second term that gains less has rivals among what the noise makes.
+static const double gain_without_rival = 20;
 
 typedef struct start {
     double merit, x[TERMS];
@@ -60,6 +64,15 @@ static bool same_place(const alb_place *p, const alb_place *q, int terms)
     return apart < 1e-2;
 }
 
+static void polish(alb_place *best, search *s, const double *x, int terms, alb_signs signs)
+{
+    alb_place p;
+    memcpy(p.x, x, sizeof p.x);
+    alb_reduced_minimise(&p, &s->all, terms, signs, 1e-9);
+    if (p.chi_square < best->chi_square)
+        *best = p;
+}
+
 // Descends from the starts on the merged readings, and on all of them from those places that may be the best.
 static void descend(alb_place *best, search *s, const starts *from, int terms, alb_signs signs)
 {
@@ -76,13 +89,9 @@ static void descend(alb_place *best, search *s, const starts *from, int terms, a
         count += !known;
         least = fmin(least, p->chi_square);
     }
-    for (int k = 0; k < count; k++) {
-        if (places[k].chi_square > 1.1 * least + 2)
-            continue;
-        alb_reduced_minimise(&places[k], &s->all, terms, signs, 1e-9);
-        if (places[k].chi_square < best->chi_square)
-            *best = places[k];
-    }
+    for (int k = 0; k < count; k++)
+        if (places[k].chi_square <= 1.1 * least + 2)
+            polish(best, s, places[k].x, terms, signs);
 }
 
 static void whiten(double *out, const double *column, const alb_whitened *data)
@@ -154,30 +163,34 @@ static void cut(starts *out, const alb_measure *m, const search *s, int terms)
         }
 }
 
-// The single exponential and a second term at each peak of what that gains, the first moved so that the mean stays.
-static void add_second(starts *out, search *s, const alb_place *one)
+// From the single exponential and a second term at each peak of what that gains, the first moved so that the mean
+// stays.
+static void polish_second(alb_place *best, search *s, const alb_place *one, alb_signs signs)
 {
     const int n = s->columns, rows = s->merged.data.basis->rows;
-    const double pivot = one->x[0];
+    const double pivot = one->x[0], sign = signs == ALB_POSITIVE ? 1 : -1;
     alb_term *first = &s->merged.term[0];
     double *gain = s->gain, *shift = s->gain + n;
+    starts from = {0};
     alb_term_evaluate(first, &s->merged.data, pivot, s->merged.work);
     const double length = sqrt(first->cc), right = first->cv / length;
     for (int j = 0; j < n; j++) {
         const double c = alb_columns_dot(first->column, s->column[j], rows) * s->scale[j] / length;
         const double a = right - c * s->right[j], b = s->right[j] - c * right;
-        gain[j] = a > 0 && b > 0 && c * c < 1 ? b * b / (1 - c * c) : 0;
+        gain[j] = a > 0 && b * sign > 0 && c * c < 1 ? b * b / (1 - c * c) : 0;
         shift[j] = a > 0 ? fmin(fmax(b / a * (pivot - s->x[j]), -0.5), 0.5) : 0;
     }
     for (int j = 0; j < n; j++) {
         const double before = j > 0 ? gain[j - 1] : 0, after = j + 1 < n ? gain[j + 1] : 0, x = pivot + shift[j];
-        if (gain[j] > 0 && gain[j] > before && gain[j] >= after)
-            keep(out, (start){gain[j], {fmin(x, s->x[j]), fmax(x, s->x[j])}});
+        if (gain[j] > 0 && gain[j] > before && gain[j] >= after &&
+            (signs == ALB_POSITIVE || s->x[j] > x + log(ALB_TIED_RATIO)))
+            keep(&from, (start){gain[j], {fmin(x, s->x[j]), fmax(x, s->x[j])}});
     }
+    keep(&from,
+         (start){0, {pivot - (signs == ALB_POSITIVE ? 0.2 : -0.05), pivot + (signs == ALB_POSITIVE ? 0.2 : 0.9)}});
+    for (int k = 0; k < from.count; k++)
+        polish(best, s, from.list[k].x, 2, signs);
 }
-
-// A second term that gains less has rivals among what the noise makes.
-static const double gain_without_rival = 30;
 
 static void search_positive(alb_place *best, search *s, const alb_place *one, int terms)
 {
@@ -187,12 +200,8 @@ static void search_positive(alb_place *best, search *s, const alb_place *one, in
                     s->gram);
     cut(&from, &m, s, terms);
     descend(best, s, &from, terms, ALB_POSITIVE);
-    if (terms == 2 && !(one->chi_square - best->chi_square > gain_without_rival)) {
-        from = (starts){0};
-        add_second(&from, s, one);
-        keep(&from, (start){0, {one->x[0] - 0.2, one->x[0] + 0.2}});
-        descend(best, s, &from, 2, ALB_POSITIVE);
-    }
+    if (terms == 2 && !(one->chi_square - best->chi_square > gain_without_rival))
+        polish_second(best, s, one, ALB_POSITIVE);
 }
 
 static void search_tied(alb_place *best, search *s, const alb_place *one)
@@ -220,10 +229,8 @@ static void search_tied(alb_place *best, search *s, const alb_place *one)
     descend(best, s, &from, 2, ALB_TIED);
     if (best->chi_square < one->chi_square)
         return;
-    alb_place p = {.x = {one->x[0] + 0.02, one->x[0] + 0.02 + log(ALB_TIED_RATIO)}};
-    alb_reduced_minimise(&p, &s->all, 2, ALB_TIED, 1e-9);
-    if (p.chi_square < best->chi_square)
-        *best = p;
+    const double close[TERMS] = {one->x[0] + 0.02, one->x[0] + 0.02 + log(ALB_TIED_RATIO)};
+    polish(best, s, close, 2, ALB_TIED);
 }
 
 // Makes the column of decay e^x one of the grid's.
@@ -289,11 +296,10 @@ static void search_signed(alb_place *best, search *s, const alb_place *one)
                 s->x[j] - s->x[i] > log(ALB_TIED_RATIO))
                 keep(&from, (start){s->gain[i * n + j], {s->x[i], s->x[j]}});
     descend(best, s, &from, 2, ALB_SIGNED);
-    if (!isfinite(tied.chi_square))
-        return;
-    alb_reduced_minimise(&tied, &s->all, 2, ALB_SIGNED, 1e-9);
-    if (tied.chi_square < best->chi_square)
-        *best = tied;
+    if (!(one->chi_square - best->chi_square > gain_without_rival))
+        polish_second(best, s, one, ALB_SIGNED);
+    if (isfinite(tied.chi_square))
+        polish(best, s, tied.x, 2, ALB_SIGNED);
 }
 
 static double *take(double **scratch, size_t count)
