@@ -69,6 +69,7 @@ bool alb_calibration_write(const alb_calibration *c, const alb_provenance *prove
     alb_json_string(&json, "sample", c->sample);
     alb_json_number(&json, "thickness_mm", c->thickness_mm);
     alb_json_number(&json, "refractive_index", c->refractive_index);
+    alb_json_string(&json, "finish", alb_finish_names[c->finish]);
     alb_json_list(&json, "channels");
     for (int i = 0; i < c->channels; i++)
         alb_json_string(&json, NULL, c->channel_names[i]);
@@ -209,14 +210,15 @@ static bool read_all(alb_calibration *c, alb_node root, alb_error *error)
     const char *sample;
     alb_node list;
     size_t count;
-    if (!alb_node_allow(
-            root,
-            "format provenance sample thickness_mm refractive_index channels white_level_dn black_dn read_noise_dn "
-            "gain_dn_per_electron flat lens views products",
-            error) ||
+    if (!alb_node_allow(root,
+                        "format provenance sample thickness_mm refractive_index finish channels white_level_dn "
+                        "black_dn read_noise_dn "
+                        "gain_dn_per_electron flat lens views products",
+                        error) ||
         !alb_node_text(&sample, root, "sample", error) ||
         !alb_node_number(&c->thickness_mm, root, "thickness_mm", 0, 1e6, error) ||
         !alb_node_number(&c->refractive_index, root, "refractive_index", 1, 10, error) ||
+        !alb_finish_read(&c->finish, root, error) ||
         !alb_node_number(&c->white_level_dn, root, "white_level_dn", 0, 1e12, error) ||
         !alb_node_list(&list, &count, root, "channels", error))
         return false;

@@ -36,6 +36,7 @@ typedef struct alb_calibration {
     char folder[ALB_PATH_SIZE]; // of the session
     char sample[ALB_NAME_SIZE];
     double thickness_mm, refractive_index;
+    alb_finish finish;
     int channels;
     char channel_names[3][8];
     alb_estimate black_dn[3], read_noise_dn[3], gain_dn_per_electron[3];

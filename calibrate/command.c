@@ -68,6 +68,7 @@ static bool measure(work *w, const char *folder, alb_error *error)
     memcpy(c->channel_names, s->channel_names, sizeof c->channel_names);
     c->thickness_mm = s->plan.thickness_mm;
     c->refractive_index = s->plan.refractive_index;
+    c->finish = s->plan.finish;
     c->channels = s->channels;
     c->white_level_dn = s->white_level_dn;
     alb_progress_begin(&progress, "calibrate", 4);

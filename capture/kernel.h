@@ -1,6 +1,7 @@
 // How a face answers light at one point, made ready to be summed: the radial kernel, blurred by the projector's
 // Gaussian, in a fine table.
 #pragma once
+#include "capture/lobe.h"
 #include "capture/truth.h"
 
 typedef struct alb_kernel {
@@ -9,6 +10,7 @@ typedef struct alb_kernel {
     double *value_per_mm2; // at 0, step, 2 step, ...; zero beyond the last
     double unscattered;    // share of the light that leaves where it falls
     double total;          // share that leaves, everywhere
+    alb_lobe lobe;         // the directions it takes
 } alb_kernel;
 
 // What truth.json tells of a traced or stated kernel; stated ones are exact (sd 0).

@@ -1,10 +1,11 @@
 // Irradiance: E = E0 sum over pixels of Phi_x Phi_y, Phi = (erf((x - x0 + p/2) / (s sqrt 2)) - erf((x - x0 - p/2) / (s
 // sqrt 2))) / 2. White reference: L = rho E / pi. Slab: M = E0 sum over points q of k(|x - q|) dA + unscattered E, L =
-// M / pi, where k is the kernel already blurred by s, so that a pixel is an even square; points at most 0.8 s apart sum
-// it to e^(-2 pi^2 / 0.64) of itself (Poisson's summation formula).
+// f M / pi, where f is the kernel's lobe (lobe.h) and k is the kernel already blurred by s, so that a pixel is an even
+// square; points at most 0.8 s apart sum it to e^(-2 pi^2 / 0.64) of itself (Poisson's summation formula).
 //
-// The face is taken as ground, shedding light evenly in all directions (L = M / pi), and the slab as wider than the
-// view. Not true for polished faces, near the slab's edges, or where the pattern's grid of discs stands off the middle.
+// The unscattered light, a beam, is given the directions of the scattered (of demo slabs it is below 1e-4), and the
+// slab is taken as wider than the view. Not true near the slab's edges, or where the pattern's grid of discs stands off
+// the middle.
 #include "capture/lit_face.h"
 #include "base/memory.h"
 #include <math.h>
@@ -125,11 +126,13 @@ static void exitance(double out[3], const alb_lit_face *face, double x_mm, doubl
                                                  : sum[c] * face->point_mm2 + face->kernels[c].unscattered * e;
 }
 
-void alb_lit_face_radiance(double out[3], const void *scene, double x_mm, double y_mm)
+void alb_lit_face_radiance(double out[3], const void *scene, double x_mm, double y_mm, double cosine)
 {
     const alb_lit_face *face = scene;
     if (face->kernels) {
         exitance(out, face, x_mm, y_mm);
+        for (int c = 0; c < 3; c++)
+            out[c] *= alb_lobe_value(&face->kernels[c].lobe, cosine);
     } else {
         const double e = irradiance_at(face, x_mm, y_mm);
         for (int c = 0; c < 3; c++)

@@ -25,5 +25,6 @@ typedef struct alb_lit_face {
 bool alb_lit_face_create(alb_lit_face *face, const alb_truth *truth, const alb_pattern *pattern,
                          const alb_kernel *kernels, const double white_reflectance[3], alb_error *error);
 void alb_lit_face_free(alb_lit_face *face);
-// Radiance W/(mm^2 sr) of three channels; `face` is an alb_lit_face (the shape that alb_flat_scene wants).
-void alb_lit_face_radiance(double out[3], const void *face, double x_mm, double y_mm);
+// Radiance W/(mm^2 sr) of three channels towards a camera at this cosine to the normal; `face` is an alb_lit_face (the
+// shape that alb_flat_scene wants).
+void alb_lit_face_radiance(double out[3], const void *face, double x_mm, double y_mm, double cosine);

@@ -19,7 +19,7 @@
 static const double roulette_weight = 1e-2, roulette_survival = 0.1;
 
 typedef struct photon_block {
-    double ring[2][ALB_PHOTON_BINS], beyond[2], absorbed;
+    double ring[2][ALB_PHOTON_BINS], beyond[2], cosine[2][ALB_PHOTON_COSINES], absorbed;
 } photon_block;
 
 typedef struct photon_slab {
@@ -135,6 +135,8 @@ static void trace(photon_block *block, const photon_slab *slab, alb_random rando
         if (travel(&p, &face, slab, &random)) {
             const double bin = slab->bin_scale * sqrt(sqrt(p.x * p.x + p.y * p.y));
             *(bin < ALB_PHOTON_BINS ? &block->ring[face][(int)bin] : &block->beyond[face]) += p.weight;
+            const double outside = sqrt(fmax(0, 1 - slab->n * slab->n * (1 - p.uz * p.uz)));
+            block->cosine[face][(int)fmin(outside * ALB_PHOTON_COSINES, ALB_PHOTON_COSINES - 1)] += p.weight;
             return;
         }
     }
@@ -164,6 +166,8 @@ static void summarise(alb_photon_tally *tally, photon_block *blocks, double fact
     for (int face = 0; face < 2; face++) {
         for (int i = 0; i < ALB_PHOTON_BINS; i++)
             over_blocks(&tally->ring[face][i], &tally->ring_sd[face][i], blocks, &blocks->ring[face][i], factor);
+        for (int i = 0; i < ALB_PHOTON_COSINES; i++)
+            over_blocks(&tally->cosine[face][i], &sd, blocks, &blocks->cosine[face][i], factor);
         for (int b = 0; b < ALB_PHOTON_BLOCKS; b++) // the beyond becomes the total
             for (int i = 0; i < ALB_PHOTON_BINS; i++)
                 blocks[b].beyond[face] += blocks[b].ring[face][i];

@@ -4,7 +4,7 @@
 #include "base/error.h"
 #include <stdint.h>
 
-enum { ALB_PHOTON_BINS = 64, ALB_PHOTON_BLOCKS = 128 };
+enum { ALB_PHOTON_BINS = 64, ALB_PHOTON_BLOCKS = 128, ALB_PHOTON_COSINES = 40 };
 
 typedef struct alb_medium {
     double absorption_per_mm, scattering_per_mm;
@@ -19,9 +19,11 @@ typedef struct alb_photon_tally {
     double edges_mm[ALB_PHOTON_BINS + 1]; // radius * (i / bins)^2
     double ring[2][ALB_PHOTON_BINS];      // scattered light that leaves through ring i
     double ring_sd[2][ALB_PHOTON_BINS];
-    double unscattered[2];            // leaves at r = 0, exact
-    double leaving[2], leaving_sd[2]; // all radii, unscattered included
-    double specular, absorbed;        // specular: from the outside of the lit face
+    double cosine[2][ALB_PHOTON_COSINES]; // scattered light that leaves, at all radii, by its cosine to the normal in
+                                          // air: equal bins from 0 to 1
+    double unscattered[2];                // leaves at r = 0, exact
+    double leaving[2], leaving_sd[2];     // all radii, unscattered included
+    double specular, absorbed;            // specular: from the outside of the lit face
 } alb_photon_tally;
 
 // Traces `photons`, rounded up to whole blocks. Photon i depends on (seed, stream, i) alone: same bytes with any number

@@ -5,6 +5,7 @@
 #include <string.h>
 
 const char *const alb_side_names[ALB_SIDES] = {"reflection", "transmission"};
+const char *const alb_finish_names[ALB_FINISHS] = {"smooth", "ground"};
 const char *const alb_target_names[ALB_TARGETS] = {"slab", "white_reference", "diffuser", "board", "cap"};
 const char *const alb_pattern_names[ALB_PATTERNS] = {"black", "white", "spot", "grid", "chessboard"};
 
@@ -152,15 +153,25 @@ static bool parse_shots(alb_plan *plan, alb_node object, alb_error *error)
     return true;
 }
 
+bool alb_finish_read(alb_finish *finish, alb_node object, alb_error *error)
+{
+    int choice = ALB_FINISH_SMOOTH;
+    const bool ok = !alb_node_has(object, "finish") ||
+                    alb_node_choice(&choice, object, "finish", alb_finish_names, ALB_FINISHS, error);
+    *finish = (alb_finish)choice;
+    return ok;
+}
+
 bool alb_plan_parse(alb_plan *plan, alb_node object, alb_error *error)
 {
     alb_node sample, white, board;
     *plan = (alb_plan){0};
     return alb_node_object(&sample, object, "sample", error) &&
-           alb_node_allow(sample, "name thickness_mm refractive_index", error) &&
+           alb_node_allow(sample, "name thickness_mm refractive_index finish", error) &&
            name(plan->sample, sample, "name", error) &&
            alb_node_number(&plan->thickness_mm, sample, "thickness_mm", 0.01, 1000, error) &&
            alb_node_number(&plan->refractive_index, sample, "refractive_index", 1, 4, error) &&
+           alb_finish_read(&plan->finish, sample, error) &&
            alb_node_object(&white, object, "white_reference", error) && alb_node_allow(white, "reflectance", error) &&
            alb_node_numbers(plan->white_reflectance, 3, white, "reflectance", 0.01, 1, error) &&
            alb_node_object(&board, object, "board", error) && alb_node_allow(board, "columns rows square_mm", error) &&
@@ -208,6 +219,7 @@ void alb_plan_put(alb_json *json, const alb_plan *plan)
     alb_json_string(json, "name", plan->sample);
     alb_json_number(json, "thickness_mm", plan->thickness_mm);
     alb_json_number(json, "refractive_index", plan->refractive_index);
+    alb_json_string(json, "finish", alb_finish_names[plan->finish]);
     alb_json_end_object(json);
     alb_json_object(json, "white_reference");
     alb_json_numbers(json, "reflectance", plan->white_reflectance, 3);

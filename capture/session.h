@@ -25,6 +25,16 @@ typedef enum alb_target {
 } alb_target;
 extern const char *const alb_target_names[ALB_TARGETS]; // "slab", "white_reference", "diffuser", "board", "cap"
 
+// The slab's faces, which decide the directions that light leaves in.
+typedef enum alb_finish {
+    ALB_FINISH_SMOOTH, // polished: Fresnel's law bends and reflects what leaves
+    ALB_FINISH_GROUND, // rough: radiance alike in all directions
+    ALB_FINISHS
+} alb_finish;
+extern const char *const alb_finish_names[ALB_FINISHS]; // "smooth", "ground"
+// The key "finish" of a record; smooth where it is not there.
+bool alb_finish_read(alb_finish *finish, alb_node object, alb_error *error);
+
 typedef enum alb_pattern_kind {
     ALB_PATTERN_BLACK,
     ALB_PATTERN_WHITE,
@@ -65,6 +75,7 @@ typedef struct alb_plan {
     char sample[ALB_NAME_SIZE]; // name of the material
     double thickness_mm;
     double refractive_index;
+    alb_finish finish;
     double white_reflectance[3];   // of the white reference, per channel
     int board_columns, board_rows; // inner corners
     double board_square_mm;

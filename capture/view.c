@@ -81,7 +81,7 @@ static void pixel(float *out, const alb_sight *sight, const alb_transform *plane
         const double t = -o.z / d.z;
         if (!(t > 0 && t < 1e9))
             continue;
-        scene->radiance(radiance, scene->scene, o.x + t * d.x, o.y + t * d.y);
+        scene->radiance(radiance, scene->scene, o.x + t * d.x, o.y + t * d.y, fabs(d.z) / alb_length(d));
         for (int c = 0; c < 3; c++)
             sum[c] += radiance[c];
     }

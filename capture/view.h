@@ -12,9 +12,9 @@ typedef struct alb_sight {
     double *corners_xy; // (width + 1) x (height + 1) undistorted x/z, y/z of the pixels' corners
 } alb_sight;
 
-// Radiance, three channels, of a point of the plane.
+// Radiance, three channels, of a point of the plane; cosine of the line of sight to the plane's normal.
 typedef struct alb_flat_scene {
-    void (*radiance)(double out[3], const void *scene, double x_mm, double y_mm);
+    void (*radiance)(double out[3], const void *scene, double x_mm, double y_mm, double cosine);
     const void *scene;
     int samples; // per pixel, a Fibonacci number: 1; 5 for smooth scenes, 34 for edges
 } alb_flat_scene;

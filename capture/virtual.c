@@ -2,7 +2,8 @@
 // the projector's pattern makes a face shine (kernel.c, lit_face.c), the camera sees it (view.c) and the sensor counts
 // it (sensor.c). The radiance of a shot is worked out once and shared by its exposures and repeats.
 //
-// What is simpler than the world: the face sheds light evenly in all directions, the slab is wider than the view, light
+// What is simpler than the world: light leaves a smooth face in the same directions at all distances from the beam
+// (those of the photons that left, lobe.c) and a ground one as Lambert says, the slab is wider than the view, light
 // from the camera's side does not exist, nothing is out of focus, and the camera stands in the same way before both
 // faces.
 #include "base/memory.h"
@@ -60,7 +61,7 @@ static double reach_mm(const virtual_rig *rig, const alb_plan *plan)
     return reach + pattern * rig->truth.projector.pixel_mm;
 }
 
-static bool kernels_from_photons(virtual_rig *rig, double radius_mm, alb_error *error)
+static bool kernels_from_photons(virtual_rig *rig, alb_finish finish, double radius_mm, alb_error *error)
 {
     alb_progress progress;
     bool ok = true;
@@ -74,6 +75,8 @@ static bool kernels_from_photons(virtual_rig *rig, double radius_mm, alb_error *
             alb_response_from_photons(&rig->responses[side][c], &tally, side);
             ok = alb_kernel_from_photons(&rig->kernels[side][c], &tally, side, rig->truth.projector.blur_sd_mm,
                                          fmin(edge, radius_mm), error);
+            if (ok && finish == ALB_FINISH_SMOOTH)
+                alb_lobe_from_photons(&rig->kernels[side][c].lobe, &tally, side);
         }
         alb_progress_at(&progress, c + 1);
     }
@@ -157,8 +160,17 @@ static bool open_rig(void **state, alb_session *session, alb_provenance *provena
                  argument, radius, sd);
         goto done;
     }
+    if (!rig->truth.is_medium && session->plan.finish != ALB_FINISH_GROUND) {
+        alb_fail(
+            error, ALB_BAD_DATA,
+            "%s: a stated profile leaves as Lambert says, but the plan's sample has a smooth face; give the plan's "
+            "sample \"finish\": \"ground\", or the rig a medium",
+            argument);
+        goto done;
+    }
     if (!check_shots(rig, &session->plan, error) ||
-        !(rig->truth.is_medium ? kernels_from_photons(rig, radius, error) : kernels_from_profile(rig, radius, error)))
+        !(rig->truth.is_medium ? kernels_from_photons(rig, session->plan.finish, radius, error)
+                               : kernels_from_profile(rig, radius, error)))
         goto done;
     describe(session, rig);
     rig->rate_shot = -1;
@@ -176,9 +188,10 @@ typedef struct printed_board {
 } printed_board;
 
 // Black and white squares within a white margin, on a grey table.
-static void board_radiance(double out[3], const void *scene, double x_mm, double y_mm)
+static void board_radiance(double out[3], const void *scene, double x_mm, double y_mm, double cosine)
 {
     const printed_board *board = scene;
+    (void)cosine;
     const double s = board->square_mm, x = x_mm + board->half[0], y = board->half[1] - y_mm;
     double share = 0.15;
     if (x >= 0 && y >= 0 && x < 2 * board->half[0] && y < 2 * board->half[1]) {
@@ -188,9 +201,9 @@ static void board_radiance(double out[3], const void *scene, double x_mm, double
     out[0] = out[1] = out[2] = share * board->white;
 }
 
-static void lamp_radiance(double out[3], const void *scene, double x_mm, double y_mm)
+static void lamp_radiance(double out[3], const void *scene, double x_mm, double y_mm, double cosine)
 {
-    (void)x_mm, (void)y_mm;
+    (void)x_mm, (void)y_mm, (void)cosine;
     out[0] = out[1] = out[2] = *(const double *)scene;
 }
 

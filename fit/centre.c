@@ -1,17 +1,21 @@
 // The centre of a spot, in two steps.
 //
-// Start: the brightest 5 x 5 mean that stands 8 sd above the median of the image, then the centroid of a window about
-// it; unmeasured pixels count as the brightest there, for they are the saturated core. Refined: Gauss-Newton on the
-// image itself against its own mean profile m(r) in rings of one pixel. A shift d of the centre changes a pixel at
-// direction u by -m'(r) d.u, so that d solves the normal equations of v - m(r) ~ -m'(r) d.u with weights 1 / variance
-// of the ring: rings are made as alike all around as they can be, without any form of profile, and pixels that were not
-// measured do not pull. Stops being true for profiles that are not round: oblique beams, edges of the sample near the
-// spot.
+// Start: the brightest 5 x 5 pixels (by the lesser of mean and median: a glint is small; by the mean where that finds
+// none) that stand 8 sd above the median of the image, then the centroid of a window about them; unmeasured pixels
+// count as the brightest there, for they are the saturated core. Refined: Gauss-Newton on the image itself against its
+// own mean profile m(r) in rings of one pixel. A shift d of the centre changes a pixel at direction u by -m'(r) d.u, so
+// that d solves the normal equations of v - m(r) ~ -m'(r) d.u with weights 1 / variance of the ring: rings are made as
+// alike all around as they can be, without any form of profile, and pixels that were not measured do not pull. Glints
+// are looked for about the start and again about the centre found with them left out. The covariance is that of the
+// normal equations, times chi-square / freedom where that is above 1. Stops being true for profiles that are not round:
+// oblique beams (anisotropy.c says so), edges of the sample near the spot.
 #include "fit/centre.h"
 #include "base/memory.h"
 #include "base/statistics.h"
+#include "fit/glint.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { SMOOTH = 2, WINDOW = 10, BINS = 2048, ITERATIONS = 40, SAMPLES_MAX = 100000 };
 
@@ -44,9 +48,11 @@ static bool level_of(level *out, const alb_channel *channel, alb_error *error)
     return ok;
 }
 
-// Mean of the valid pixels about (x, y), and the variance of that mean; NaN where fewer than half are valid.
-static double smoothed(double *variance, const alb_channel *channel, int x, int y)
+// Mean of the valid pixels about (x, y), or their median where that is less and `least` (what interests) is passed; and
+// the variance of the mean. NaN where fewer than half are valid.
+static double smoothed(double *variance, const alb_channel *channel, int x, int y, bool by_median, double least)
 {
+    double values[(2 * SMOOTH + 1) * (2 * SMOOTH + 1)];
     const int width = channel->face->width, height = channel->face->height;
     double sum = 0, variances = 0;
     int count = 0;
@@ -57,12 +63,14 @@ static double smoothed(double *variance, const alb_channel *channel, int x, int 
             const size_t i = (size_t)v * (size_t)width + (size_t)u;
             if (!isfinite(channel->value[i]) || !isfinite(channel->face->x_mm[i]))
                 continue;
-            sum += channel->value[i];
+            sum += values[count] = channel->value[i];
             variances += channel->variance && isfinite(channel->variance[i]) ? channel->variance[i] : 0;
             count++;
         }
     *variance = count ? variances / count / count : 0;
-    return 2 * count > (2 * SMOOTH + 1) * (2 * SMOOTH + 1) ? sum / count : (double)NAN;
+    if (2 * count <= (2 * SMOOTH + 1) * (2 * SMOOTH + 1))
+        return NAN;
+    return by_median && sum / count > least ? fmin(sum / count, alb_median(values, (size_t)count)) : sum / count;
 }
 
 typedef struct peak {
@@ -70,7 +78,7 @@ typedef struct peak {
     int x, y;
 } peak;
 
-static bool brightest(peak *out, const alb_channel *channel, alb_error *error)
+static bool brightest(peak *out, const alb_channel *channel, bool by_median, alb_error *error)
 {
     const int height = channel->face->height;
     peak *rows = alb_allocate((size_t)height, sizeof *rows, error);
@@ -81,7 +89,7 @@ static bool brightest(peak *out, const alb_channel *channel, alb_error *error)
         rows[y].value = -INFINITY;
         for (int x = 0; x < channel->face->width; x++) {
             double variance;
-            const double value = smoothed(&variance, channel, x, y);
+            const double value = smoothed(&variance, channel, x, y, by_median, rows[y].value);
             if (value > rows[y].value)
                 rows[y] = (peak){value, variance, x, y};
         }
@@ -125,8 +133,8 @@ typedef struct bin {
 } bin;
 
 // Mean profile in rings one pixel wide about (x, y); returns how many of them stand above a fiftieth of the highest.
-static int profile_about(bin bins[BINS], const alb_channel *channel, double x_mm, double y_mm, double pitch_mm,
-                         double background)
+static int profile_about(bin bins[BINS], const alb_channel *channel, const bool *glint, double x_mm, double y_mm,
+                         double pitch_mm, double background)
 {
     const size_t count = (size_t)channel->face->width * (size_t)channel->face->height;
     for (int k = 0; k < BINS; k++)
@@ -134,7 +142,7 @@ static int profile_about(bin bins[BINS], const alb_channel *channel, double x_mm
     for (size_t i = 0; i < count; i++) {
         const double r = hypot(channel->face->x_mm[i] - x_mm, channel->face->y_mm[i] - y_mm) / pitch_mm;
         const double value = channel->value[i];
-        if (!(r < BINS) || !isfinite(value))
+        if (!(r < BINS) || !isfinite(value) || glint[i])
             continue;
         bin *b = &bins[(int)r];
         b->count++;
@@ -162,12 +170,12 @@ typedef struct comparison {
     double residual, slope_per_mm, cosine, sine;
 } comparison;
 
-static bool compare(comparison *out, const bin *bins, int used, const alb_channel *channel, size_t i, double x_mm,
-                    double y_mm, double pitch_mm)
+static bool compare(comparison *out, const bin *bins, int used, const alb_channel *channel, const bool *glint, size_t i,
+                    double x_mm, double y_mm, double pitch_mm)
 {
     const double x = channel->face->x_mm[i] - x_mm, y = channel->face->y_mm[i] - y_mm, r = hypot(x, y);
     const double value = channel->value[i], t = fmax(r / pitch_mm - 0.5, 0);
-    if (!(r < used * pitch_mm) || !isfinite(value) || r == 0)
+    if (!(r < used * pitch_mm) || !isfinite(value) || r == 0 || glint[i])
         return false;
     const int k = (int)t;
     if (!(bins[k].count > 0 && bins[k + 1].count > 0))
@@ -178,26 +186,26 @@ static bool compare(comparison *out, const bin *bins, int used, const alb_channe
 }
 
 // Where the pixels have no variances: the scatter about the profile.
-static void scatter_about(bin bins[BINS], int used, const alb_channel *channel, double x_mm, double y_mm,
-                          double pitch_mm)
+static void scatter_about(bin bins[BINS], int used, const alb_channel *channel, const bool *glint, double x_mm,
+                          double y_mm, double pitch_mm)
 {
     const size_t count = (size_t)channel->face->width * (size_t)channel->face->height;
     for (size_t i = 0; i < count; i++) {
         comparison c;
-        if (compare(&c, bins, used, channel, i, x_mm, y_mm, pitch_mm))
+        if (compare(&c, bins, used, channel, glint, i, x_mm, y_mm, pitch_mm))
             bins[c.bin].variance += c.residual * c.residual;
     }
 }
 
-// One Gauss-Newton step; false where the equations do not determine it.
-static bool shift_of(double *dx_mm, double *dy_mm, const bin *bins, int used, const alb_channel *channel, double x_mm,
-                     double y_mm, double pitch_mm)
+// One Gauss-Newton step and its covariance; false where the equations do not determine it.
+static bool shift_of(double shift_mm[2], double covariance_mm2[3], const bin *bins, int used,
+                     const alb_channel *channel, const bool *glint, double x_mm, double y_mm, double pitch_mm)
 {
     const size_t count = (size_t)channel->face->width * (size_t)channel->face->height;
-    double xx = 0, xy = 0, yy = 0, hx = 0, hy = 0;
+    double xx = 0, xy = 0, yy = 0, hx = 0, hy = 0, squares = 0, freedom = -used - 2;
     for (size_t i = 0; i < count; i++) {
         comparison c;
-        if (!compare(&c, bins, used, channel, i, x_mm, y_mm, pitch_mm))
+        if (!compare(&c, bins, used, channel, glint, i, x_mm, y_mm, pitch_mm))
             continue;
         const bin *b = &bins[c.bin];
         const double low = b->sum / b->count, step = c.slope_per_mm * pitch_mm;
@@ -207,39 +215,63 @@ static bool shift_of(double *dx_mm, double *dy_mm, const bin *bins, int used, co
         const double gx = -c.slope_per_mm * c.cosine, gy = -c.slope_per_mm * c.sine;
         xx += weight * gx * gx, xy += weight * gx * gy, yy += weight * gy * gy;
         hx += weight * gx * c.residual, hy += weight * gy * c.residual;
+        squares += weight * c.residual * c.residual;
+        freedom++;
     }
-    const double determinant = xx * yy - xy * xy;
+    const double determinant = xx * yy - xy * xy, scale = freedom > 0 ? fmax(1, squares / freedom) : 1;
     if (!(determinant > 1e-9 * xx * yy))
         return false;
-    *dx_mm = (yy * hx - xy * hy) / determinant;
-    *dy_mm = (xx * hy - xy * hx) / determinant;
+    shift_mm[0] = (yy * hx - xy * hy) / determinant;
+    shift_mm[1] = (xx * hy - xy * hx) / determinant;
+    covariance_mm2[0] = scale * yy / determinant;
+    covariance_mm2[1] = -scale * xy / determinant;
+    covariance_mm2[2] = scale * xx / determinant;
     return true;
 }
 
-static bool refine(double *x_mm, double *y_mm, const alb_channel *channel, double pitch_mm, double background,
+static bool refine(alb_centre *centre, const alb_channel *channel, const bool *glint, double background,
                    alb_error *error)
 {
     bin *bins = alb_allocate(BINS, sizeof *bins, error);
     if (!bins)
         return false;
+    const double pitch = centre->pitch_mm;
     for (int iteration = 0; iteration < ITERATIONS; iteration++) {
-        const int used = profile_about(bins, channel, *x_mm, *y_mm, pitch_mm, background);
-        double dx, dy;
+        const int used = profile_about(bins, channel, glint, centre->x_mm, centre->y_mm, pitch, background);
+        double shift[2];
         if (!channel->variance)
-            scatter_about(bins, used, channel, *x_mm, *y_mm, pitch_mm);
-        if (!shift_of(&dx, &dy, bins, used, channel, *x_mm, *y_mm, pitch_mm))
+            scatter_about(bins, used, channel, glint, centre->x_mm, centre->y_mm, pitch);
+        if (!shift_of(shift, centre->covariance_mm2, bins, used, channel, glint, centre->x_mm, centre->y_mm, pitch))
             break;
-        const double length = hypot(dx, dy), most = 3 * pitch_mm, share = length > most ? most / length : 1;
-        *x_mm += share * dx;
-        *y_mm += share * dy;
-        if (length < 1e-4 * pitch_mm)
+        const double length = hypot(shift[0], shift[1]), most = 3 * pitch, share = length > most ? most / length : 1;
+        centre->x_mm += share * shift[0];
+        centre->y_mm += share * shift[1];
+        if (length < 1e-4 * pitch)
             break;
     }
     free(bins);
     return true;
 }
 
-bool alb_centre_find(double *x_mm, double *y_mm, double *pitch_mm, const alb_channel *channel, alb_error *error)
+// From the start to the centre, glints left out.
+static bool refine_without_glints(alb_centre *centre, bool *glint, bool leave_out, const alb_channel *channel,
+                                  double background, alb_error *error)
+{
+    memset(glint, 0, (size_t)channel->face->width * (size_t)channel->face->height * sizeof *glint);
+    for (int pass = 0; pass < 2; pass++) {
+        if (leave_out && !alb_glints_find(glint, channel, centre->x_mm, centre->y_mm, centre->pitch_mm, error))
+            return false;
+        const double x_mm = centre->x_mm, y_mm = centre->y_mm;
+        if (!refine(centre, channel, glint, background, error))
+            return false;
+        if (!leave_out || hypot(centre->x_mm - x_mm, centre->y_mm - y_mm) < 0.02 * centre->pitch_mm)
+            break;
+    }
+    return true;
+}
+
+bool alb_centre_find(alb_centre *centre, bool *glint, bool leave_out_glints, const alb_channel *channel,
+                     alb_error *error)
 {
     const alb_face *face = channel->face;
     level image;
@@ -247,11 +279,17 @@ bool alb_centre_find(double *x_mm, double *y_mm, double *pitch_mm, const alb_cha
     if (face->width < 8 || face->height < 8)
         return alb_fail(error, ALB_BAD_DATA, "%s: %d x %d pixels are too few for a spot; 8 x 8 at least", channel->name,
                         face->width, face->height);
-    if (!level_of(&image, channel, error) || !brightest(&top, channel, error))
+    if (!level_of(&image, channel, error) || !brightest(&top, channel, true, error))
         return false;
     if (image.valid == 0)
         return alb_fail(error, ALB_BAD_DATA, "%s: no spot: no pixel holds a finite value", channel->name);
-    const double box = (2 * SMOOTH + 1) * (2 * SMOOTH + 1), sd = fmax(sqrt(top.variance), image.sd / sqrt(box));
+    const double box = (2 * SMOOTH + 1) * (2 * SMOOTH + 1), least_sd = image.sd / sqrt(box);
+    double sd = fmax(sqrt(top.variance), least_sd);
+    if (!(top.value - image.median > 8 * sd)) {
+        if (!brightest(&top, channel, false, error))
+            return false;
+        sd = fmax(sqrt(top.variance), least_sd);
+    }
     if (!(top.value - image.median > 8 * sd) || !(top.value > 0))
         return alb_fail(error, ALB_BAD_DATA,
                         "%s: no spot: the brightest place (%g) is not 8 sd (%g each) above the median (%g)",
@@ -267,12 +305,11 @@ bool alb_centre_find(double *x_mm, double *y_mm, double *pitch_mm, const alb_cha
     if (!isfinite(face->x_mm[i]))
         return alb_fail(error, ALB_BAD_DATA, "%s: the spot, pixel (%d, %d), does not lie on the face", channel->name, x,
                         y);
-    *x_mm = face->x_mm[i];
-    *y_mm = face->y_mm[i];
-    *pitch_mm = sqrt(face->area_mm2[i]);
-    if (!refine(x_mm, y_mm, channel, *pitch_mm, image.median, error))
+    *centre = (alb_centre){face->x_mm[i], face->y_mm[i], sqrt(face->area_mm2[i]), {0}};
+    if (!refine_without_glints(centre, glint, leave_out_glints, channel, image.median, error))
         return false;
-    if (!isfinite(*x_mm + *y_mm) || hypot(*x_mm - face->x_mm[i], *y_mm - face->y_mm[i]) > 50 * *pitch_mm)
+    const double moved = hypot(centre->x_mm - face->x_mm[i], centre->y_mm - face->y_mm[i]);
+    if (!(moved < 50 * centre->pitch_mm))
         return alb_fail(error, ALB_BAD_DATA, "%s: no spot: it is not alike all around pixel (%d, %d)", channel->name, x,
                         y);
     return true;

@@ -2,5 +2,12 @@
 #pragma once
 #include "fit/observe.h"
 
-// Centre of the spot on the face and the distance between neighbouring pixels there. ALB_BAD_DATA where there is none.
-bool alb_centre_find(double *x_mm, double *y_mm, double *pitch_mm, const alb_channel *channel, alb_error *error);
+typedef struct alb_centre {
+    double x_mm, y_mm, pitch_mm; // on the face; distance between neighbouring pixels there
+    double covariance_mm2[3];    // xx, xy, yy
+} alb_centre;
+
+// Flags glints (glint.h) in glint[width * height] on the way where they are to be left out.
+// ALB_BAD_DATA where there is no spot.
+bool alb_centre_find(alb_centre *centre, bool *glint, bool leave_out_glints, const alb_channel *channel,
+                     alb_error *error);

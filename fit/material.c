@@ -1,10 +1,18 @@
 // material.json: written by fit, read strictly by render.
 #include "base/record.h"
-#include "fit/measurement.h"
+#include "fit/energy.h"
+#include "fit/profile.h"
 #include "fit/search.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+
+static void find_properties(alb_fitting *fitting)
+{
+    for (int i = 0; i < ALB_SIDES * 3; i++)
+        fitting->basis.common_sd[i / 3][i % 3] = fitting->sides[i / 3][i % 3].common.flux;
+    alb_properties_find(fitting->properties, &fitting->material, &fitting->basis);
+}
 
 bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
 {
@@ -16,13 +24,18 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
             continue;
         measurement->measured = alb_choose(&measurement->outcome, &measurement->readings, &measurement->forward,
                                            measurement->common, &reasons[i]);
-        if (measurement->measured)
-            fitting->material.fitted[i / 3][i % 3] = measurement->outcome.fitted;
     }
     for (int i = 0; i < ALB_SIDES * 3; i++)
         if (reasons[i].status != ALB_OK)
             return alb_fail(error, reasons[i].status, "%s %s: %s", alb_side_names[i / 3],
                             fitting->material.channel_names[i % 3], reasons[i].text);
+    for (int c = 0; c < fitting->material.channels; c++)
+        if (!alb_energy_hold(fitting, c, error))
+            return false;
+    for (int i = 0; i < ALB_SIDES * 3; i++)
+        if (fitting->sides[i / 3][i % 3].measured)
+            fitting->material.fitted[i / 3][i % 3] = fitting->sides[i / 3][i % 3].outcome.fitted;
+    find_properties(fitting);
     return true;
 }
 
@@ -47,11 +60,34 @@ static void put_attempts(alb_json *json, const alb_outcome *outcome)
             alb_json_number(json, "decay_ratio_held", ALB_TIED_RATIO);
         alb_json_number(json, "chi_square", attempt->chi_square);
         alb_json_integer(json, "degrees_of_freedom", attempt->degrees_of_freedom);
+        alb_json_number(json, "p_value", attempt->p_value);
         alb_json_number(json, "bic", attempt->bic);
+        alb_json_number(json, "bic_excess", attempt->bic_excess);
+        alb_json_number(json, "residual_lag_1", attempt->lag_1);
+        alb_json_number(json, "residual_lag_1_p_value", attempt->lag_1_p);
+        if (attempt->at_bound >= 0)
+            alb_json_string(json, "at_bound", alb_form_parameter_name(attempt->form, attempt->at_bound));
         alb_json_string(json, "rejected", attempt->rejected);
         alb_json_end_object(json);
     }
     alb_json_end_list(json);
+}
+
+// An estimate with its 95 % interval (null: an open end), the Cramer-Rao bound, and whether the data identify it.
+static void put_known(alb_json *json, const char *key, double value, double sd, const alb_certainty *certainty,
+                      bool with_reason)
+{
+    const double interval[2] = {certainty->lower, certainty->upper};
+    alb_json_object(json, key);
+    alb_json_number(json, "value", value);
+    alb_json_number(json, "sd", sd);
+    alb_json_numbers(json, "interval_95", interval, 2);
+    alb_json_number(json, "cramer_rao_sd", certainty->cramer_rao_sd);
+    if (with_reason)
+        alb_json_boolean(json, "identifiable", !*certainty->because);
+    if (*certainty->because)
+        alb_json_string(json, "because", certainty->because);
+    alb_json_end_object(json);
 }
 
 static void put_outcome(alb_json *json, const char *side, const alb_outcome *outcome)
@@ -69,14 +105,21 @@ static void put_outcome(alb_json *json, const char *side, const alb_outcome *out
     }
     alb_json_object(json, "parameters");
     for (int p = 0; p < n; p++)
-        alb_json_estimate(json, alb_form_parameter_name(fitted->profile.form, p), fitted->profile.parameters[p],
-                          fitted->sd[p]);
+        put_known(json, alb_form_parameter_name(fitted->profile.form, p), fitted->profile.parameters[p], fitted->sd[p],
+                  &outcome->knowledge.parameters[p], true);
     alb_json_end_object(json);
     alb_json_list(json, "covariance");
     for (int p = 0; p < n; p++)
         alb_json_numbers(json, NULL, fitted->covariance[p], (size_t)n);
     alb_json_end_list(json);
-    alb_json_estimate(json, "total", fitted->total, fitted->total_sd);
+    alb_json_number(json, "condition", outcome->knowledge.condition);
+    put_known(json, "total", fitted->total, fitted->total_sd, &outcome->knowledge.total, false);
+    if (fitted->total < outcome->free_total) {
+        alb_json_object(json, "energy_held");
+        alb_json_number(json, "free_total", outcome->free_total);
+        alb_json_number(json, "chi_square_rise", outcome->energy_rise);
+        alb_json_end_object(json);
+    }
     alb_json_number(json, "chi_square", fitted->chi_square);
     alb_json_integer(json, "degrees_of_freedom", fitted->degrees_of_freedom);
     alb_json_string(json, "errors_from",
@@ -111,6 +154,7 @@ void alb_material_put(alb_json *json, const alb_fitting *fitting)
         for (int side = 0; side < ALB_SIDES; side++)
             if (fitting->sides[side][c].measured)
                 put_outcome(json, alb_side_names[side], &fitting->sides[side][c].outcome);
+        alb_properties_put(json, &fitting->properties[c]);
         alb_json_end_object(json);
     }
     alb_json_end_object(json);
@@ -128,23 +172,16 @@ bool alb_material_write(const alb_fitting *fitting, const alb_provenance *proven
     return alb_json_write(&json, path, error);
 }
 
-// Parameters must keep S finite and positive everywhere.
 static bool check_profile(const alb_profile *profile, alb_node node, alb_error *error)
 {
     const double *p = profile->parameters;
-    bool good = p[0] > 0 && p[1] > 0;
-    if (profile->form == ALB_FORM_TWO_EXPONENTIALS)
-        good &= p[2] >= 0 && p[3] > 0;
-    if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS)
-        good &= p[2] <= 0 && p[0] + p[2] >= -1e-12 * p[0] && p[3] > p[1];
-    if (profile->form == ALB_FORM_THREE_EXPONENTIALS)
-        good &= p[2] > 0 && p[3] > p[1] && p[4] > 0 && p[5] > p[3];
-    if (profile->form == ALB_FORM_DIPOLE)
-        good = p[0] > 0 && p[1] > 0 && p[2] >= 1 && p[2] <= 3;
-    return good || alb_node_fail(error, node, "parameters",
-                                 "not a positive profile that falls off: %s (%g, %g, %g, %g, %g, %g)",
-                                 alb_form_name(profile->form), p[0], p[1], p[2], p[3], p[4], p[5]);
+    return alb_profile_sound(profile) ||
+           alb_node_fail(error, node, "parameters",
+                         "not a positive profile that falls off: %s (%g, %g, %g, %g, %g, %g)",
+                         alb_form_name(profile->form), p[0], p[1], p[2], p[3], p[4], p[5]);
 }
+
+static const char estimate_keys[] = "value sd interval_95 cramer_rao_sd identifiable because";
 
 static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
 {
@@ -158,7 +195,7 @@ static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
     for (int p = 0; p < n; p++) {
         const char *name = alb_form_parameter_name(profile->form, p);
         strncat(strncat(names, name, 60), " ", 2);
-        if (!alb_node_object(&one, parameters, name, error) || !alb_node_allow(one, "value sd", error) ||
+        if (!alb_node_object(&one, parameters, name, error) || !alb_node_allow(one, estimate_keys, error) ||
             !alb_node_number(&profile->parameters[p], one, "value", -1e300, 1e300, error) ||
             (fitted->identifiable && !alb_node_number(&fitted->sd[p], one, "sd", 0, 1e300, error)))
             return false;
@@ -182,18 +219,19 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
     const char *form;
     long freedom;
     alb_node total;
-    if (!alb_node_allow(node,
-                        "form decay_ratio_held identifiable best_guess undecided parameters covariance total "
-                        "chi_square degrees_of_freedom "
-                        "errors_from discrepancy_relative rms_relative measured_share_of_total tail_slope_per_mm tried",
-                        error) ||
+    if (!alb_node_allow(
+            node,
+            "form decay_ratio_held identifiable best_guess undecided parameters covariance condition total energy_held "
+            "chi_square degrees_of_freedom "
+            "errors_from discrepancy_relative rms_relative measured_share_of_total tail_slope_per_mm tried",
+            error) ||
         !alb_node_text(&form, node, "form", error))
         return false;
     if (!alb_form_from_name(&fitted->profile.form, form))
         return alb_node_fail(error, node, "form", "unknown form '%s'", form);
     if (!alb_node_boolean(&fitted->identifiable, node, "identifiable", error) ||
         !read_parameters(fitted, node, error) || !alb_node_object(&total, node, "total", error) ||
-        !alb_node_allow(total, "value sd", error) ||
+        !alb_node_allow(total, estimate_keys, error) ||
         !alb_node_number(&fitted->total, total, "value", 0, 1e300, error) ||
         (fitted->identifiable && !alb_node_number(&fitted->total_sd, total, "sd", 0, 1e300, error)) ||
         !alb_node_number(&fitted->chi_square, node, "chi_square", 0, 1e300, error) ||
@@ -233,7 +271,8 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
             return alb_node_fail(error, channels, key, "name longer than 7 characters");
         snprintf(material->channel_names[c], sizeof material->channel_names[0], "%s", key);
         if (!alb_node_object(&channel, channels, key, error) ||
-            !alb_node_allow(channel, "reflection transmission", error))
+            !alb_node_allow(channel, "reflection transmission optical_properties", error) ||
+            !alb_properties_check(channel, error))
             return false;
         for (int side = 0; side < ALB_SIDES; side++)
             if (alb_node_has(channel, alb_side_names[side]) &&

@@ -13,11 +13,18 @@ typedef enum alb_form {
     ALB_FORM_SIGNED_EXPONENTIALS, // the same with b1 < b2, a2 < 0, a1 + a2 >= 0: S >= 0 everywhere
     ALB_FORM_THREE_EXPONENTIALS,  // three terms, a > 0, b1 < b2 < b3
     ALB_FORM_DIPOLE,              // classic dipole of a half-space (Jensen et al. 2001)
+    ALB_FORM_TWO_OVER_R,          // (a1 e^(-b1 r) + a2 e^(-b2 r)) / r, a > 0, b1 < b2
+    ALB_FORM_BURLEY,              // A (e^(-r/d) + e^(-r/(3 d))) / (8 pi d r) (Christensen & Burley 2015)
+    ALB_FORM_BURIED_SOURCE,       // a e^(-b (rho - z)) / rho, rho^2 = r^2 + z^2, all > 0: flat at r = 0
+    ALB_FORM_BURIED_AND_OVER_R,   // one buried source and a2 e^(-b2 r) / r
+    ALB_FORM_TWO_BURIED_SOURCES,  // two of them, b1 < b2
+    ALB_FORM_BETTER_DIPOLE,       // of a half-space (d'Eon 2012), as diffusion.h
     ALB_FORMS
 } alb_form;
 
-// Parameters of the exponential forms: a1, b1, a2, b2, a3, b3 (amplitude_1_per_mm2, decay_1_per_mm, ...).
-// Of the dipole: absorption_per_mm, reduced_scattering_per_mm, refractive_index.
+// Parameters, in order: of sums of exponentials a1, b1, a2, b2, a3, b3 (amplitude_1_per_mm2, decay_1_per_mm, ...), over
+// r the same in amplitude_1_per_mm; of buried sources a1, b1, z1, a2, b2, z2 (depth_1_mm); of Burley's albedo (A) and
+// length_mm (d); of the dipoles absorption_per_mm, reduced_scattering_per_mm, refractive_index.
 typedef struct alb_profile {
     alb_form form;
     double parameters[ALB_PARAMETERS_MAX];
@@ -28,12 +35,14 @@ const char *alb_form_name(alb_form form);                  // "two_exponentials"
 const char *alb_form_parameter_name(alb_form form, int i); // "amplitude_1_per_mm2"
 bool alb_form_from_name(alb_form *form, const char *name);
 
-// S(r), 1/mm^2; r >= 0 in mm.
+// S(r), 1/mm^2; r >= 0 in mm. INFINITY at r = 0 where the form goes as 1/r; its mean over any ring is finite.
 double alb_profile_value(const alb_profile *profile, double r_mm);
 // 2 pi integral S r dr over the plane: the share of the incident flux that leaves. Closed form.
 double alb_profile_total(const alb_profile *profile);
 // P(rho) = integral_0^rho S(r) r dr: what the exact self-term of a patch needs. Closed form.
 double alb_profile_disc(const alb_profile *profile, double rho_mm);
+// Mean of S over the ring between two distances, 1/mm^2; outer > inner >= 0.
+double alb_profile_ring(const alb_profile *profile, double inner_mm, double outer_mm);
 
 // A profile with what is known of it.
 typedef struct alb_fitted {

@@ -1,10 +1,11 @@
 // Whitened model values and their derivatives. For sums of exponentials all come from the readings of e^(-b r) and
 // r e^(-b r) of the terms: two columns of the operator each, one application for two terms, a second for the third.
+// Other forms give their value and derivatives on the operator's grid.
 #include "fit/model.h"
 #include "base/memory.h"
-#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 double alb_energy(const alb_readings *readings, const double *value)
 {
@@ -63,11 +64,9 @@ static void apply_terms(alb_model *model, const double *p, int from, int paramet
                        (const double(*)[ALB_OPERATOR_COLUMNS])model->on_grid);
 }
 
-void alb_model_evaluate(alb_model *model, const alb_profile *profile)
+static void evaluate_exponentials(alb_model *model, const alb_profile *profile)
 {
-    assert(alb_form_term_count(profile->form) > 0);
-    const alb_weighing *weighing = model->weighing;
-    const int n = weighing->readings->count, parameters = alb_form_parameter_count(profile->form);
+    const int n = model->weighing->readings->count, parameters = alb_form_parameter_count(profile->form);
     const double *p = profile->parameters;
     for (int from = 0; from < parameters; from += ALB_OPERATOR_COLUMNS)
         apply_terms(model, p, from, parameters);
@@ -80,7 +79,35 @@ void alb_model_evaluate(alb_model *model, const alb_profile *profile)
             model->values[2 + t][i] = -p[t] * column[1];
         }
     }
-    for (int q = 0; q <= parameters; q++) {
+}
+
+// Any other form: its value and derivatives on the grid, four columns at a time.
+static void evaluate_on_grid(alb_model *model, const alb_profile *profile)
+{
+    const alb_operator *forward = model->weighing->forward;
+    const int n = model->weighing->readings->count, columns = 1 + alb_form_parameter_count(profile->form);
+    for (int from = 0; from < columns; from += ALB_OPERATOR_COLUMNS) {
+        double values[ALB_PARAMETERS_MAX + 1 + ALB_OPERATOR_COLUMNS] = {0};
+        for (int k = 0; k < forward->grid_count; k++) {
+            values[0] = alb_profile_gradient(values + 1, profile, forward->grid_mm[k]);
+            memcpy(model->on_grid[k], values + from, sizeof model->on_grid[k]);
+        }
+        alb_operator_apply(model->columns[0], forward, (const double(*)[ALB_OPERATOR_COLUMNS])model->on_grid);
+        for (int c = from; c < columns && c < from + ALB_OPERATOR_COLUMNS; c++)
+            for (int i = 0; i < n; i++)
+                model->values[c][i] = model->columns[0][i][c - from];
+    }
+}
+
+void alb_model_evaluate(alb_model *model, const alb_profile *profile)
+{
+    const alb_weighing *weighing = model->weighing;
+    const int n = weighing->readings->count;
+    if (alb_form_term_count(profile->form) > 0)
+        evaluate_exponentials(model, profile);
+    else
+        evaluate_on_grid(model, profile);
+    for (int q = 0; q <= alb_form_parameter_count(profile->form); q++) {
         double *values = model->values[q];
         if (weighing->energy_sd > 0)
             values[n] = alb_energy(weighing->readings, values) / weighing->energy_sd;

@@ -17,7 +17,7 @@ double alb_weighing_reading(const alb_weighing *weighing, int i);
 // sum value * area, of any readings.
 double alb_energy(const alb_readings *readings, const double *value);
 
-enum { ALB_MODEL_BLOCKS = (ALB_PARAMETERS_MAX + ALB_OPERATOR_COLUMNS - 1) / ALB_OPERATOR_COLUMNS };
+enum { ALB_MODEL_BLOCKS = (ALB_PARAMETERS_MAX + ALB_OPERATOR_COLUMNS) / ALB_OPERATOR_COLUMNS };
 
 // Room for the values of one profile at a time; each thread has its own. Zero is empty.
 typedef struct alb_model {
@@ -29,5 +29,5 @@ typedef struct alb_model {
 
 bool alb_model_create(alb_model *model, const alb_weighing *weighing, alb_error *error);
 void alb_model_free(alb_model *model);
-// Fills values; only for sums of exponentials (term count > 0). Where parameters overflow, so do the values.
+// Fills values. Where parameters overflow, so do the values.
 void alb_model_evaluate(alb_model *model, const alb_profile *profile);

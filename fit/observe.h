@@ -8,6 +8,7 @@
 typedef struct alb_face {
     int width, height;
     double *x_mm, *y_mm, *area_mm2;
+    double *cosine; // of the line of sight to the face's normal
 } alb_face;
 
 // A plane seen square on.
@@ -26,6 +27,12 @@ typedef struct alb_channel {
 
 enum { ALB_RING_SAMPLES = 16 };
 
+// How far from round: of the part of the rings that goes once (or twice) round, amplitude relative to the value.
+typedef struct alb_anisotropy {
+    double most, most_r_mm; // largest among the rings of clear light, and where
+    double chance;          // that noise alone makes as much over all rings
+} alb_anisotropy;
+
 // Mean values over rings about the centre. Ring i holds sample_share[i][k] of its pixels at distances of mean
 // sample_r_mm[i][k] with mean value sample_value[i][k].
 typedef struct alb_readings {
@@ -35,11 +42,18 @@ typedef struct alb_readings {
     double *sd;       // of the mean
     double *area_mm2; // of the face that the reading stands for
     double (*sample_r_mm)[ALB_RING_SAMPLES], (*sample_share)[ALB_RING_SAMPLES], (*sample_value)[ALB_RING_SAMPLES];
-    double x_mm, y_mm;  // centre
-    double outer_mm;    // where the readings end
-    double core_mm;     // pixels were not measured (saturated) out to here; 0: none missing
-    double complete_mm; // rings beyond are cut by the border of the image
-    bool drowned;       // ended in the noise, not at the border
+    double (
+        *harmonics)[4];  // parts of cos phi, sin phi, cos 2 phi, sin 2 phi, relative to the value; NaN: too few pixels
+    double *harmonic_sd; // of each
+    alb_anisotropy anisotropy[2];
+    double x_mm, y_mm;               // centre
+    double centre_covariance_mm2[3]; // xx, xy, yy
+    long pixels, missing, glints;    // within outer_mm: read; not measured (saturated, dead); left out (glint.c)
+    double outer_mm;                 // where the readings end
+    double core_mm;           // a quarter of the pixels or more was not measured (saturated) out to here; 0: none
+    double complete_mm;       // rings beyond are cut by the border of the image
+    bool drowned;             // ended in the noise, not at the border
+    double far_value, far_sd; // mean over the pixels beyond, out to the border of the image; sd 0: there are none
 } alb_readings;
 
 bool alb_readings_create(alb_readings *readings, int count, alb_error *error);
@@ -48,6 +62,8 @@ void alb_readings_free(alb_readings *readings);
 // Finds the spot and reads rings. ALB_BAD_DATA where there is no spot: nothing valid, nothing above the noise, or the
 // brightest place on the border.
 bool alb_observe(alb_readings *readings, const alb_channel *channel, alb_error *error);
+// The same, no glints looked for: every pixel counts (a spot with a sharp rim that is not round).
+bool alb_observe_whole(alb_readings *readings, const alb_channel *channel, alb_error *error);
 
 // How a spot's power lies about its centre: shares of the power (sum 1) at distances. A single sample at 0: a pencil
 // beam.

@@ -86,18 +86,23 @@ static void evaluate(double *residuals, double *jacobian, const double *u, const
     }
 }
 
-static void order_terms(alb_profile *profile)
+// Of the solver's parameters: amplitudes within e^40 of what the readings show, decays and depths by their range.
+static void bounds_of(double *lower, double *upper, alb_form form, const alb_weighing *weighing)
 {
-    double *p = profile->parameters;
-    const int terms = alb_form_term_count(profile->form);
-    if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS)
-        return; // in order by its bounds
-    for (int i = 1; i < terms; i++)
-        for (int j = i; j > 0 && p[2 * j + 1] < p[2 * j - 1]; j--) {
-            const double a = p[2 * j], b = p[2 * j + 1];
-            p[2 * j] = p[2 * j - 2], p[2 * j + 1] = p[2 * j - 1];
-            p[2 * j - 2] = a, p[2 * j - 1] = b;
-        }
+    const double outer = weighing->readings->outer_mm;
+    double top = 0;
+    for (int i = 0; i < weighing->readings->count; i++)
+        top = fmax(top, fabs(weighing->readings->value[i]));
+    for (int p = 0; p < alb_form_parameter_count(form); p++) {
+        const alb_parameter *parameter = alb_form_parameter(form, p);
+        const double amplitude = log(top) + (parameter->length + 2) * log(outer);
+        lower[p] = parameter->flux ? amplitude - 40 : parameter->length < 0 ? log(0.01 / outer) : log(1e-5 * outer);
+        upper[p] = parameter->flux ? amplitude + 40 : parameter->length < 0 ? log(1e7 / outer) : log(1e1 * outer);
+    }
+    if (form == ALB_FORM_SIGNED_EXPONENTIALS) {
+        lower[2] = 0, upper[2] = 1;
+        lower[3] = log(ALB_TIED_RATIO - 1), upper[3] = log(1e7);
+    }
 }
 
 bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate candidate, const alb_weighing *weighing,
@@ -106,29 +111,29 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate c
     search s = {.candidate = candidate};
     if (!alb_model_create(&s.model, weighing, error))
         return false;
-    double top = 0, u[PARAMETERS], lower[PARAMETERS], upper[PARAMETERS], chain[PARAMETERS][PARAMETERS];
-    for (int i = 0; i < weighing->readings->count; i++)
-        top = fmax(top, fabs(weighing->readings->value[i]));
+    double u[PARAMETERS], lower[PARAMETERS], upper[PARAMETERS], chain[PARAMETERS][PARAMETERS];
     solver_of(u, profile);
-    const double outer = weighing->readings->outer_mm;
-    for (int p = 0; p < PARAMETERS; p++) {
-        const bool amplitude = p % 2 == 0;
-        lower[p] = amplitude ? log(top) - 40 : log(0.01 / outer);
-        upper[p] = amplitude ? log(top) + 40 : log(1e7 / outer);
-    }
-    if (profile->form == ALB_FORM_SIGNED_EXPONENTIALS) {
-        lower[2] = 0, upper[2] = 1;
-        lower[3] = log(ALB_TIED_RATIO - 1), upper[3] = log(1e7);
-    }
+    bounds_of(lower, upper, candidate.form, weighing);
     const int parameters = alb_candidate_parameters(candidate);
     for (int p = 0; p < parameters; p++)
         u[p] = fmin(fmax(u[p], lower[p]), upper[p]);
     const alb_problem problem = {parameters, alb_weighing_rows(weighing), evaluate, &s, lower, upper};
     const bool ok = alb_solve(u, chi_square, &problem, error);
     *profile = profile_of(chain, candidate, u);
-    order_terms(profile);
+    alb_profile_order(profile);
     alb_model_free(&s.model);
     return ok;
+}
+
+int alb_search_at_bound(const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing)
+{
+    double u[PARAMETERS], lower[PARAMETERS], upper[PARAMETERS];
+    solver_of(u, profile);
+    bounds_of(lower, upper, candidate.form, weighing);
+    for (int p = 0; p < alb_candidate_parameters(candidate); p++)
+        if (fmin(u[p] - lower[p], upper[p] - u[p]) < 1e-6 * (upper[p] - lower[p]))
+            return p;
+    return -1;
 }
 
 // Readings under a finite spot see interpolated columns in the search, so that its result is polished by the exact

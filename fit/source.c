@@ -1,52 +1,49 @@
 // From files to fitted sides.
 //
-// A session's products hold radiance per flux, L / Phi. The exitance is M = pi L for a face that leaves light as
-// Lambert says; real faces do within 5 % below 50 degrees and fall to 0.57 of it at 82 degrees, measured by Monte
-// Carlo, so that a camera further than 50 degrees off the normal is pointed out. The image of the spot on the white
-// reference serves both sides: it is the light that enters the front. Images given by hand keep their unit; what
-// saturates (integers at full scale) and what is not finite counts as not measured.
+// A session's products hold radiance per flux, L / Phi; every pixel is turned into exitance by the direction that it
+// sees the face from (exit_angle.c), which is 1 % uncertain for a smooth face and common to a side's readings. The
+// image of the spot on the white reference serves both sides: it is the light that enters the front. Images given by
+// hand keep their unit; what saturates (integers at full scale) and what is not finite counts as not measured.
 #include "fit/source.h"
 #include "base/image.h"
 #include "base/memory.h"
 #include "calibrate/calibration.h"
+#include "fit/exit_angle.h"
+#include "fit/product.h"
 #include "fit/table.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-// One channel of an image as numbers that the observer takes, times `factor`.
-typedef struct plane {
-    double *value, *variance;
-} plane;
-
-static void plane_free(plane *out)
+void alb_plane_free(alb_plane *out)
 {
     free(out->value);
     free(out->variance);
-    *out = (plane){0};
+    *out = (alb_plane){0};
 }
 
-static bool plane_take(plane *out, const alb_image *image, const char *channel, double factor, double saturation,
-                       alb_error *error)
+bool alb_plane_take(alb_plane *out, const alb_image *image, const char *channel, const double *factor,
+                    double saturation, alb_error *error)
 {
     char variance_name[ALB_CHANNEL_NAME + 16];
     snprintf(variance_name, sizeof variance_name, "variance.%s", channel);
     const int c = alb_image_channel(image, channel), v = alb_image_channel(image, variance_name);
     const size_t count = (size_t)image->width * (size_t)image->height;
-    *out = (plane){.value = alb_allocate(count, sizeof(double), error)};
+    *out = (alb_plane){.value = alb_allocate(count, sizeof(double), error)};
     if (v >= 0)
         out->variance = alb_allocate(count, sizeof(double), error);
     if (!out->value || (v >= 0 && !out->variance)) {
-        plane_free(out);
+        alb_plane_free(out);
         return false;
     }
     for (size_t i = 0; i < count; i++) {
         const float *pixel = image->pixels + i * (size_t)image->channels;
         const double value = (double)pixel[c];
-        out->value[i] = isfinite(value) && value < saturation ? factor * value : (double)NAN;
+        const double f = factor ? factor[i] : 1;
+        out->value[i] = isfinite(value) && value < saturation ? f * value : (double)NAN;
         if (v >= 0)
-            out->variance[i] = factor * factor * (double)pixel[v];
+            out->variance[i] = f * f * (double)pixel[v];
     }
     return true;
 }
@@ -59,24 +56,25 @@ typedef struct photo {
     const alb_image *image;
     const alb_face *face;
     const alb_spot *spots[3];
-    double factor, saturation;
+    const double *factor; // of each pixel; NULL: 1
+    double saturation;
 } photo;
 
 // Observes one channel and builds its forward model.
 static bool observe_channel(alb_fitting *fitting, const photo *seen, int channel, alb_text *notes, alb_error *error)
 {
     char name[64], full_name[1024];
-    plane pixels = {0};
+    alb_plane pixels = {0};
     const char *channel_name = fitting->material.channel_names[channel];
     alb_measurement *measurement = &fitting->sides[seen->side][channel];
     alb_readings *readings = &measurement->readings;
     snprintf(name, sizeof name, "%s %s", alb_side_names[seen->side], channel_name);
     snprintf(full_name, sizeof full_name, "%.900s: %s", seen->from, name);
-    bool ok = plane_take(&pixels, seen->image, channel_name, seen->factor, seen->saturation, error);
+    bool ok = alb_plane_take(&pixels, seen->image, channel_name, seen->factor, seen->saturation, error);
     const alb_channel observed = {seen->face, pixels.value, pixels.variance, full_name};
     ok = ok && alb_observe(readings, &observed, error) &&
          alb_operator_create(&measurement->forward, readings, seen->spots[channel], error);
-    plane_free(&pixels);
+    alb_plane_free(&pixels);
     if (ok && readings->core_mm > 0)
         alb_text_add(notes,
                      "%s: pixels out to %.4g mm of the centre are not measured (saturated); the core is the form's.\n",
@@ -104,8 +102,8 @@ static bool observe_channels(alb_fitting *fitting, const photo *seen, alb_text *
     return all;
 }
 
-static bool read_product(alb_image *image, alb_provenance *provenance, const alb_calibration *calibration,
-                         const alb_product *product, alb_error *error)
+bool alb_product_read(alb_image *image, alb_provenance *provenance, const alb_calibration *calibration,
+                      const alb_product *product, alb_error *error)
 {
     char path[ALB_PATH_SIZE];
     if (!alb_calibration_image(path, calibration, product, error) || !alb_provenance_add(provenance, path, error) ||
@@ -142,19 +140,19 @@ static bool measure_spots(alb_spot spots[3], alb_provenance *provenance, const a
 {
     alb_image image = {0};
     alb_face face = {0};
-    bool ok = read_product(&image, provenance, calibration, white, error) &&
+    bool ok = alb_product_read(&image, provenance, calibration, white, error) &&
               alb_face_seen(&face, &calibration->views[white->side].camera, error);
     alb_error reasons[3] = {{0}};
 #pragma omp parallel for schedule(dynamic)
     for (int c = 0; c < (ok ? calibration->channels : 0); c++) {
         char name[ALB_NAME_SIZE + 16];
-        plane pixels = {0};
+        alb_plane pixels = {0};
         snprintf(name, sizeof name, "%s %s", white->shot, calibration->channel_names[c]);
-        if (plane_take(&pixels, &image, calibration->channel_names[c], 1, INFINITY, &reasons[c])) {
+        if (alb_plane_take(&pixels, &image, calibration->channel_names[c], NULL, INFINITY, &reasons[c])) {
             const alb_channel channel = {&face, pixels.value, pixels.variance, name};
             alb_spot_measure(&spots[c], &channel, &reasons[c]);
         }
-        plane_free(&pixels);
+        alb_plane_free(&pixels);
     }
     for (int c = 0; c < 3; c++)
         if (ok && reasons[c].status != ALB_OK)
@@ -181,17 +179,33 @@ static bool white_spot_for(white_spot *white, alb_provenance *provenance, const 
                     calibration->folder, pattern->diameter_px);
 }
 
-static void note_view(alb_text *notes, const alb_calibration *calibration, alb_side side)
+bool alb_exitance_factor(double **factor, alb_text *notes, const alb_calibration *calibration, alb_side side,
+                         const alb_face *face, alb_error *error)
 {
-    const alb_transform world_from_camera = alb_inverse(&calibration->views[side].camera.camera_from_world);
-    const alb_vector eye = world_from_camera.translation;
-    const double angle_deg = acos(fabs(eye.z) / alb_length(eye)) * 180 / M_PI;
-    if (angle_deg > 50)
-        alb_text_add(
-            notes,
-            "%s: the camera looks %.0f degrees off the normal; beyond 50 a face leaves less than Lambert's law says, "
-            "and the profile comes out too low.\n",
-            alb_side_names[side], angle_deg);
+    const alb_exit exit = alb_exit_of(side, calibration->finish, calibration->refractive_index);
+    const size_t count = (size_t)face->width * (size_t)face->height;
+    const double least = cos(ALB_EXIT_MOST_DEG * M_PI / 180);
+    double steepest = 0, flattest = 1;
+    size_t oblique = 0;
+    if (!(*factor = alb_allocate(count, sizeof **factor, error)))
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        const double cosine = face->cosine[i];
+        (*factor)[i] = cosine >= least ? M_PI / alb_exit_ratio(&exit, cosine) : (double)NAN;
+        oblique += cosine < least;
+        if (cosine >= least)
+            steepest = fmax(steepest, cosine), flattest = fmin(flattest, cosine);
+    }
+    if (exit.smooth && steepest >= least)
+        alb_text_add(notes,
+                     "%s: seen %.1f to %.1f degrees off the normal of a smooth face, which sheds %.3f to %.3f of what "
+                     "Lambert's law says: corrected.\n",
+                     alb_side_names[side], acos(steepest) * 180 / M_PI, acos(flattest) * 180 / M_PI,
+                     alb_exit_ratio(&exit, steepest), alb_exit_ratio(&exit, flattest));
+    if (oblique)
+        alb_text_add(notes, "%s: %zu pixels see the face more than %d degrees off its normal and are left out.\n",
+                     alb_side_names[side], oblique, ALB_EXIT_MOST_DEG);
+    return true;
 }
 
 static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provenance *provenance, alb_text *notes,
@@ -199,19 +213,23 @@ static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provena
 {
     alb_image image = {0};
     alb_face face = {0};
-    note_view(notes, calibration, product->side);
-    bool ok = read_product(&image, provenance, calibration, product, error) &&
+    double *factor = NULL;
+    bool ok = alb_product_read(&image, provenance, calibration, product, error) &&
               alb_face_seen(&face, &calibration->views[product->side].camera, error) &&
-              white_spot_for(white, provenance, calibration, &product->pattern, error);
+              white_spot_for(white, provenance, calibration, &product->pattern, error) &&
+              alb_exitance_factor(&factor, notes, calibration, product->side, &face, error);
     if (ok) {
         const alb_spot *spots = white->spots;
         const photo seen = {product->shot, product->side, &image, &face, {&spots[0], &spots[1], &spots[2]},
-                            M_PI,          INFINITY};
+                            factor,        INFINITY};
         for (int c = 0; c < calibration->channels; c++)
             fitting->sides[product->side][c].common =
-                (alb_common_sd){product->relative_scale_sd[c], calibration->views[product->side].relative_length_sd};
+                (alb_common_sd){hypot(product->relative_scale_sd[c],
+                                      calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0),
+                                calibration->views[product->side].relative_length_sd};
         ok = observe_channels(fitting, &seen, notes, error);
     }
+    free(factor);
     alb_face_free(&face);
     alb_image_free(&image);
     return ok;
@@ -248,9 +266,12 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, 
     bool ok = calibration && alb_path_join(path, folder, "calibration.json", error) &&
               alb_calibration_read(calibration, folder, error) && alb_provenance_add(provenance, path, error);
     if (ok) {
+        fitting->absolute = true;
         memcpy(material->name, calibration->sample, sizeof material->name);
         material->thickness_mm = calibration->thickness_mm;
         material->refractive_index = calibration->refractive_index;
+        fitting->basis.finish = calibration->finish;
+        fitting->basis.own_sd = calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0;
         material->channels = calibration->channels;
         memcpy(material->channel_names, calibration->channel_names, sizeof material->channel_names);
         ok = observe_products(fitting, provenance, notes, calibration, error) && alb_fitting_run(fitting, error);
@@ -289,7 +310,7 @@ static bool observe_image(alb_fitting *fitting, alb_text *notes, const char *pat
     if (ok && bits)
         alb_text_add(notes, "%s: %d-bit values are taken as linear; those at full scale as not measured.\n",
                      alb_path_name(path), bits);
-    const photo seen = {path, side, &image, &face, {spot, spot, spot}, 1, saturation};
+    const photo seen = {path, side, &image, &face, {spot, spot, spot}, NULL, saturation};
     ok = ok && observe_channels(fitting, &seen, notes, error);
     alb_face_free(&face);
     alb_image_free(&image);

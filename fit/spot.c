@@ -44,7 +44,7 @@ bool alb_spot_measure(alb_spot *spot, const alb_channel *white, alb_error *error
     bool ok = false;
     alb_readings readings = {0};
     *spot = (alb_spot){0};
-    if (!alb_observe(&readings, white, error))
+    if (!alb_observe_whole(&readings, white, error))
         return false;
     if (readings.core_mm > 0) {
         alb_fail(error, ALB_BAD_DATA,

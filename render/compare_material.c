@@ -70,8 +70,7 @@ static double fitted_mean(const alb_profile_check *p, size_t i)
     const double width = fmin((p->r_mm[after] - p->r_mm[before]) / (double)(after - before), 1.5 * r);
     const double middle = (r + sqrt(r * r - width * width / 3)) / 2;
     const double inner = fmax(middle - width / 2, 0), outer = middle + width / 2;
-    return 2 * (alb_profile_disc(&p->fitted.profile, outer) - alb_profile_disc(&p->fitted.profile, inner)) /
-           (outer * outer - inner * inner);
+    return alb_profile_ring(&p->fitted.profile, inner, outer);
 }
 
 static void measure_curve(alb_profile_check *p)

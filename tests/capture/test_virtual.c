@@ -29,7 +29,7 @@ static void flux(double out[3], const alb_lit_face *face, double radius, double 
     for (double r = step / 2; r < radius; r += step)
         for (int k = 0; k < 64; k++) {
             double radiance[3];
-            alb_lit_face_radiance(radiance, face, r * cos(2 * pi * k / 64), r * sin(2 * pi * k / 64));
+            alb_lit_face_radiance(radiance, face, r * cos(2 * pi * k / 64), r * sin(2 * pi * k / 64), 1);
             for (int c = 0; c < 3; c++)
                 out[c] += radiance[c] * pi * r * step * 2 * pi / 64;
         }
@@ -116,9 +116,9 @@ static void stated_kernel_near_the_middle(void **state)
 // A straight edge along the pixels moves evenly: the share of light in a column follows its place to 1/34.
 static double edge_mm;
 
-static void edge(double out[3], const void *scene, double x, double y)
+static void edge(double out[3], const void *scene, double x, double y, double cosine)
 {
-    (void)scene, (void)y;
+    (void)scene, (void)y, (void)cosine;
     out[0] = out[1] = out[2] = x < edge_mm;
 }
 
@@ -178,9 +178,9 @@ static void spot_in_the_picture(void **state)
 }
 
 // Bilinear lines of sight land where the camera model puts them.
-static void ramp(double out[3], const void *scene, double x, double y)
+static void ramp(double out[3], const void *scene, double x, double y, double cosine)
 {
-    (void)scene;
+    (void)scene, (void)cosine;
     out[0] = 100 + x, out[1] = 100 + y, out[2] = 1;
 }
 

@@ -108,9 +108,10 @@ static void damaged_three(void **state)
     alb_fitting *fitting = calloc(1, sizeof *fitting);
     write_table(&truth);
     fit_and_write(fitting, ALB_REFLECTION);
-    check_replaced("\"amplitude_3_per_mm2\": {\"value\": ", "\"amplitude_3_per_mm2\": {\"value\": -",
+    check_replaced("\"amplitude_3_per_mm2\": {\n            \"value\": ",
+                   "\"amplitude_3_per_mm2\": {\n            \"value\": -", "not a positive profile");
+    check_replaced("\"decay_2_per_mm\": {\n            \"value\": ", "\"decay_2_per_mm\": {\n            \"value\": 9",
                    "not a positive profile");
-    check_replaced("\"decay_2_per_mm\": {\"value\": ", "\"decay_2_per_mm\": {\"value\": 9", "not a positive profile");
     check_replaced("three_exponentials", "two_exponentials", "unknown key");
     alb_fitting_free(fitting);
     free(fitting);
@@ -125,8 +126,10 @@ static void damaged(void **state)
     fit_and_write(fitting, ALB_REFLECTION);
     check_replaced("two_exponentials", "four_exponentials", "unknown form");
     check_replaced("\"decay_1_per_mm\"", "\"decay_1_per_cm\"", "decay_1_per_mm");
-    check_replaced("\"decay_1_per_mm\": {\"value\": ", "\"decay_1_per_mm\": {\"value\": -", "not a positive profile");
-    check_replaced("\"total\": {\"value\": ", "\"total\": {\"value\": 1", "does not belong to the parameters");
+    check_replaced("\"decay_1_per_mm\": {\n            \"value\": ", "\"decay_1_per_mm\": {\n            \"value\": -",
+                   "not a positive profile");
+    check_replaced("\"total\": {\n          \"value\": ", "\"total\": {\n          \"value\": 1",
+                   "does not belong to the parameters");
     check_replaced("\"channels\"", "\"colour\": 1, \"channels\"", "unknown key");
     check_replaced("\"format\": 1", "\"format\": 2", "format");
     check_replaced("\"covariance\": [", "\"covariance\": [[1, 1, 1, 1], ", "5 rows for 4");

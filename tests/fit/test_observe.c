@@ -57,7 +57,9 @@ static double centre_ratio(picture *p, double hole_mm, bool with_variance)
         alb_error error = {0};
         alb_random random = alb_random_at(8, 0, t);
         const double x = 5 + 2 * alb_random_uniform(&random), y = 5 + 2 * alb_random_uniform(&random);
-        double information = 0, found_x, found_y, found_pitch;
+        double information = 0;
+        alb_centre found;
+        static bool glint[SIZE * SIZE];
         paint(p, x, y, 2, t);
         for (int i = 0; i < SIZE * SIZE; i++) {
             const double dx = p->face.x_mm[i] - x, dy = p->face.y_mm[i] - y, r = hypot(dx, dy), h = 1e-4;
@@ -69,9 +71,10 @@ static double centre_ratio(picture *p, double hole_mm, bool with_variance)
             information += slope * slope * dx * dx / (r * r + 1e-12) / p->variance[i];
         }
         const alb_channel channel = seen(p, with_variance);
-        check_ok(alb_centre_find(&found_x, &found_y, &found_pitch, &channel, &error), &error);
-        check_near(found_pitch, pitch, 1e-12);
-        squares += ((found_x - x) * (found_x - x) + (found_y - y) * (found_y - y)) * information / (2 * TRIALS);
+        check_ok(alb_centre_find(&found, glint, true, &channel, &error), &error);
+        check_near(found.pitch_mm, pitch, 1e-12);
+        squares +=
+            ((found.x_mm - x) * (found.x_mm - x) + (found.y_mm - y) * (found.y_mm - y)) * information / (2 * TRIALS);
     }
     return sqrt(squares);
 }

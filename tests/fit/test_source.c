@@ -93,6 +93,7 @@ static void make_session(void)
                            .sample = "wax",
                            .thickness_mm = 5,
                            .refractive_index = 1.4,
+                           .finish = ALB_FINISH_GROUND,
                            .channels = 1,
                            .channel_names = {"Y"},
                            .white_level_dn = 4095,

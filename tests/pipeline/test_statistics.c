@@ -20,7 +20,8 @@ static const stated truth[ALB_SIDES][CHANNELS] = {
 };
 
 static const char plan[] =
-    "{\"format\": 1, \"sample\": {\"name\": \"stated\", \"thickness_mm\": 6, \"refractive_index\": 1.5},\n"
+    "{\"format\": 1, \"sample\": {\"name\": \"stated\", \"thickness_mm\": 6, \"refractive_index\": 1.5, \"finish\": "
+    "\"ground\"},\n"
     " \"white_reference\": {\"reflectance\": [0.99, 0.98, 0.97]},\n"
     " \"board\": {\"columns\": 7, \"rows\": 5, \"square_mm\": 3.5},\n"
     " \"shots\": [\n"
