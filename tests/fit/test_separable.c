@@ -156,9 +156,10 @@ static void same_in_units(const double (*units)[2], int count)
                 alb_basis_free(&scaled.basis);
                 check_ok(alb_basis_create(&scaled.basis, &scaled.readings, &scaled.forward, &error), &error);
                 alb_separable_fit(&fit, candidate, &scaled.basis, v, s, 0, scaled.scratch);
-                assert_int_equal(fit.found, plain.found);
                 check_relative(fit.chi_square, plain.chi_square, 1e-8); // rounding of the data in other units
-                for (int p = 0; fit.found && fit.full_rank && p < alb_form_parameter_count((alb_form)form); p++) {
+                // a term that gains nothing may be found or not
+                for (int p = 0;
+                     fit.found && plain.found && fit.full_rank && p < alb_form_parameter_count((alb_form)form); p++) {
                     const double unit = p % 2 ? 1 / units[u][1] : units[u][0];
                     const double sd_p = sqrt(plain.covariance[p][p]);
                     check_near(fit.profile.parameters[p] / unit, plain.profile.parameters[p], 1e-3 * sd_p);
