@@ -15,7 +15,6 @@
 // Stops being true for slabs so thin that light leaves behind, for alpha' below 0.8, where diffusion no longer holds,
 // and within a mean free path of the beam.
 #include "fit/appearance.h"
-#include "base/record.h"
 #include <math.h>
 
 enum { QUANTILES = 180, STEPS = 80 };
@@ -142,18 +141,21 @@ static void fit_black(alb_appearance_channel *out, const alb_profile *profile)
     out->burley.length_mm = 1 / (alb_burley_beam_ratio(0) * (profile->parameters[0] + profile->parameters[1]));
 }
 
-static void take_medium(alb_appearance_channel *out, const alb_profile *profile, double absorption_per_mm,
-                        double reduced_scattering_per_mm, double refractive_index)
+static void take_medium(alb_appearance_channel *out, const alb_profile *profile, const alb_optical_estimate *measured,
+                        double refractive_index)
 {
-    out->medium_source = ALB_MEDIUM_MEASURED;
-    out->absorption_per_mm = absorption_per_mm;
-    out->reduced_scattering_per_mm = reduced_scattering_per_mm;
+    if (measured->known) {
+        out->medium_source = ALB_MEDIUM_MEASURED;
+        out->absorption_per_mm = measured->absorption_per_mm;
+        out->reduced_scattering_per_mm = measured->reduced_scattering_per_mm;
+        return;
+    }
     if (is_dipole(profile)) {
+        out->medium_source = ALB_MEDIUM_MEASURED;
         out->absorption_per_mm = profile->parameters[0];
         out->reduced_scattering_per_mm = profile->parameters[1];
-    }
-    if (out->absorption_per_mm + out->reduced_scattering_per_mm > 0)
         return;
+    }
     const double albedo = alb_albedo_invert(out->burley.albedo, refractive_index);
     const double path_mm = alb_burley_beam_ratio(out->burley.albedo) * out->burley.length_mm;
     out->medium_source = ALB_MEDIUM_INVERTED;
@@ -161,35 +163,7 @@ static void take_medium(alb_appearance_channel *out, const alb_profile *profile,
     out->reduced_scattering_per_mm = albedo / path_mm;
 }
 
-static bool read_medium(alb_media *media, int c, alb_node channel, alb_error *error)
-{
-    alb_node properties, absorption, scattering;
-    if (!alb_node_has(channel, "optical_properties"))
-        return true;
-    if (!alb_node_object(&properties, channel, "optical_properties", error))
-        return false;
-    return alb_node_has(properties, "refused") ||
-           (alb_node_object(&absorption, properties, "absorption_per_mm", error) &&
-            alb_node_object(&scattering, properties, "reduced_scattering_per_mm", error) &&
-            alb_node_number(&media->absorption_per_mm[c], absorption, "value", 0, 1e300, error) &&
-            alb_node_number(&media->reduced_scattering_per_mm[c], scattering, "value", 0, 1e300, error));
-}
-
-bool alb_media_read(alb_media *media, const char *path, alb_error *error)
-{
-    alb_node root, channels, channel;
-    alb_record *record = alb_record_read(path, error);
-    *media = (alb_media){{0}, {0}};
-    bool ok = record && alb_record_root(&root, record, error) && alb_node_object(&channels, root, "channels", error);
-    for (size_t c = 0; ok && c < alb_node_key_count(channels) && c < 3; c++)
-        ok = alb_node_object(&channel, channels, alb_node_key(channels, c), error) &&
-             read_medium(media, (int)c, channel, error);
-    alb_record_free(record);
-    return ok;
-}
-
-bool alb_appearance_derive(alb_appearance *appearance, const alb_material *material, const alb_media *media,
-                           alb_error *error)
+bool alb_appearance_derive(alb_appearance *appearance, const alb_material *material, alb_error *error)
 {
     *appearance = (alb_appearance){
         .material = material, .refractive_index = material->refractive_index, .channels = material->channels};
@@ -219,8 +193,7 @@ bool alb_appearance_derive(alb_appearance *appearance, const alb_material *mater
             fit_burley(out, &reflection->profile);
         else
             fit_black(out, &reflection->profile);
-        take_medium(out, &reflection->profile, media->absorption_per_mm[c], media->reduced_scattering_per_mm[c],
-                    appearance->refractive_index);
+        take_medium(out, &reflection->profile, &material->optical[c], appearance->refractive_index);
     }
     return true;
 }

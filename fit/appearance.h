@@ -34,16 +34,8 @@ typedef struct alb_appearance {
     alb_appearance_channel channel[3];
 } alb_appearance;
 
-// Absorption and reduced scattering per mm of each channel, where they are known apart from the profiles; 0, 0: not.
-typedef struct alb_media {
-    double absorption_per_mm[3], reduced_scattering_per_mm[3];
-} alb_media;
-
-// The "optical_properties" of a material.json that alb_material_read takes.
-bool alb_media_read(alb_media *media, const char *path, alb_error *error);
 // ALB_BAD_DATA where a channel has no reflection, or one of more light than came in (a picture without absolute scale).
-bool alb_appearance_derive(alb_appearance *appearance, const alb_material *material, const alb_media *media,
-                           alb_error *error);
+bool alb_appearance_derive(alb_appearance *appearance, const alb_material *material, alb_error *error);
 
 // sigma_s' / (sigma_a + sigma_s') of a half-space of the index whose reflection has the total; total in [0, 1].
 double alb_albedo_invert(double total, double refractive_index);

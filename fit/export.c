@@ -35,7 +35,7 @@ static void make_identifier(char identifier[ALB_NAME_SIZE], const char *name)
 }
 
 bool alb_export_prepare(alb_export *exported, const alb_exporter *exporter, const alb_material *material,
-                        const alb_media *media, const char *path, double unit_mm, alb_error *error)
+                        const char *path, double unit_mm, alb_error *error)
 {
     *exported = (alb_export){.material = material, .unit_mm = unit_mm};
     snprintf(exported->source, sizeof exported->source, "%.255s", alb_path_name(path));
@@ -47,7 +47,7 @@ bool alb_export_prepare(alb_export *exported, const alb_exporter *exporter, cons
     if (material->channels == 2)
         return alb_fail(error, ALB_BAD_DATA, "%s: channels %s and %s; a renderer wants three, or one for all", path,
                         material->channel_names[0], material->channel_names[1]);
-    if (!alb_appearance_derive(&exported->appearance, material, media, error))
+    if (!alb_appearance_derive(&exported->appearance, material, error))
         return false;
     for (int c = material->channels; c < 3; c++)
         exported->appearance.channel[c] = exported->appearance.channel[0];

@@ -25,7 +25,7 @@ const alb_exporter *alb_exporter_find(const char *name);
 // What the exporter needs of the material that was read from `path`. Fails as alb_appearance_derive does; renderers get
 // three channels: a single one stands for all, two are refused (ALB_BAD_DATA).
 bool alb_export_prepare(alb_export *exported, const alb_exporter *exporter, const alb_material *material,
-                        const alb_media *media, const char *path, double unit_mm, alb_error *error);
+                        const char *path, double unit_mm, alb_error *error);
 // What a reader should know, a line each behind `prefix`: the unit, the numbers in mm and how they were found.
 void alb_export_put_origin(alb_text *text, const alb_export *exported, const char *prefix);
 

@@ -75,12 +75,11 @@ static bool run(int argc, char **argv, alb_error *error)
     alb_provenance provenance = {.command = "export"};
     snprintf(provenance.options, sizeof provenance.options, "--to %s --unit-mm %.9g", format, unit_mm);
     alb_material material;
-    alb_media media;
     alb_export exported;
     alb_text text = {0};
     bool ok = alb_file_check_target(out, error) && alb_material_read(&material, path, error) &&
-              alb_media_read(&media, path, error) &&
-              alb_export_prepare(&exported, exporter, &material, &media, path, unit_mm, error) &&
+
+              alb_export_prepare(&exported, exporter, &material, path, unit_mm, error) &&
               alb_provenance_add(&provenance, path, error);
     if (ok) {
         exporter->put(&text, &exported);

@@ -8,7 +8,6 @@
 enum { MATERIALS = 60 };
 // Numbers are printed with nine digits; the goal for a round trip is 1e-3.
 static const double digits = 1e-7;
-static const alb_media unknown = {{0}, {0}};
 
 // A random three-channel material of absolute scale: sums of exponentials and dipoles of random length and total.
 static alb_material random_material(unsigned index)
@@ -41,8 +40,7 @@ static char *exported(alb_export *export, const char *format, const alb_material
     alb_error error = {0};
     alb_text text = {0};
     const alb_exporter *exporter = alb_exporter_find(format);
-    check_ok(alb_export_prepare(export, exporter, material, &unknown, ALB_SOURCE_FOLDER "/README.md", unit_mm, &error),
-             &error);
+    check_ok(alb_export_prepare(export, exporter, material, ALB_SOURCE_FOLDER "/README.md", unit_mm, &error), &error);
     exporter->put(&text, export);
     assert_false(text.failed);
     return text.bytes;
@@ -151,7 +149,7 @@ static void round_trips_of_fits(void **state)
         const double unit_mm = exp(8 * alb_random_uniform(&random) - 3);
         double absorption[3][3], scattering[3][3];
         alb_appearance appearance;
-        check_ok(alb_appearance_derive(&appearance, &material, &unknown, &error), &error);
+        check_ok(alb_appearance_derive(&appearance, &material, &error), &error);
         check_cycles(&material, unit_mm);
         check_arnold(&material, unit_mm);
         read_media(absorption, scattering, &material, unit_mm);
@@ -173,16 +171,17 @@ static void known_things_pass_through(void **state)
     (void)state;
     alb_error error = {0};
     alb_appearance appearance;
-    alb_media media = {{0.01}, {1.5}};
-    alb_material material = {.channels = 1, .channel_names = {"Y"}, .refractive_index = 1.4};
+    alb_material material = {
+        .channels = 1, .channel_names = {"Y"}, .refractive_index = 1.4, .optical = {{true, 0.01, 1.5}}};
     material.fitted[ALB_REFLECTION][0] =
         (alb_fitted){.profile = {ALB_FORM_BURLEY, {0.6, 2.5}}, .total = 0.6, .identifiable = true};
-    check_ok(alb_appearance_derive(&appearance, &material, &media, &error), &error);
+    check_ok(alb_appearance_derive(&appearance, &material, &error), &error);
     check_relative(appearance.channel[0].burley.length_mm, 2.5, 1e-7);
     check_near(appearance.channel[0].deviation_maximum, 0, 1e-6);
     assert_int_equal(appearance.channel[0].medium_source, ALB_MEDIUM_MEASURED);
     check_near(appearance.channel[0].reduced_scattering_per_mm, 1.5, 0);
-    check_ok(alb_appearance_derive(&appearance, &material, &unknown, &error), &error);
+    material.optical[0].known = false;
+    check_ok(alb_appearance_derive(&appearance, &material, &error), &error);
     assert_int_equal(appearance.channel[0].medium_source, ALB_MEDIUM_INVERTED);
 }
 
@@ -267,7 +266,7 @@ static void deviation_is_what_is_said(void **state)
     material.fitted[ALB_REFLECTION][0] = (alb_fitted){
         .profile = {ALB_FORM_EXPONENTIAL, {share * b * b / (2 * M_PI), b}}, .total = share, .identifiable = true};
     alb_appearance appearance;
-    check_ok(alb_appearance_derive(&appearance, &material, &unknown, &error), &error);
+    check_ok(alb_appearance_derive(&appearance, &material, &error), &error);
     double squares[3] = {0}, largest = 0;
     const double d = appearance.channel[0].burley.length_mm;
     double light = 0;
@@ -296,13 +295,13 @@ static void lengths_scale(void **state)
             alb_error error = {0};
             alb_material material = random_material(i);
             alb_appearance mm, scaled;
-            check_ok(alb_appearance_derive(&mm, &material, &unknown, &error), &error);
+            check_ok(alb_appearance_derive(&mm, &material, &error), &error);
             alb_material other = material;
             for (int t = 0; t < 3; t++) {
                 other.fitted[ALB_REFLECTION][1].profile.parameters[2 * t] /= k * k;
                 other.fitted[ALB_REFLECTION][1].profile.parameters[2 * t + 1] /= k;
             }
-            check_ok(alb_appearance_derive(&scaled, &other, &unknown, &error), &error);
+            check_ok(alb_appearance_derive(&scaled, &other, &error), &error);
             check_relative(scaled.channel[1].burley.length_mm, k * mm.channel[1].burley.length_mm, 1e-6);
             check_relative(scaled.channel[1].deviation_rms, mm.channel[1].deviation_rms, 1e-6);
         }
@@ -329,14 +328,14 @@ static void refused(void **state)
     const char *path = ALB_SOURCE_FOLDER "/README.md";
     alb_material material = random_material(0);
     material.fitted[ALB_REFLECTION][1].total = 1.5;
-    check_fails(alb_export_prepare(&export, alb_exporter_find("pbrt"), &material, &unknown, path, 1, &error), &error,
+    check_fails(alb_export_prepare(&export, alb_exporter_find("pbrt"), &material, path, 1, &error), &error,
                 ALB_BAD_DATA, "channel G reflects 1.5");
-    check_ok(alb_export_prepare(&export, alb_exporter_find("csv"), &material, &unknown, path, 1, &error), &error);
+    check_ok(alb_export_prepare(&export, alb_exporter_find("csv"), &material, path, 1, &error), &error);
     material.fitted[ALB_REFLECTION][1].profile.form = ALB_FORM_NONE;
-    check_fails(alb_export_prepare(&export, alb_exporter_find("pbrt"), &material, &unknown, path, 1, &error), &error,
+    check_fails(alb_export_prepare(&export, alb_exporter_find("pbrt"), &material, path, 1, &error), &error,
                 ALB_BAD_DATA, "no reflection");
     material.channels = 2;
-    check_fails(alb_export_prepare(&export, alb_exporter_find("cycles"), &material, &unknown, path, 1, &error), &error,
+    check_fails(alb_export_prepare(&export, alb_exporter_find("cycles"), &material, path, 1, &error), &error,
                 ALB_BAD_DATA, "channels R and G");
     assert_null(alb_exporter_find("teapot"));
 }
