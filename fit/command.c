@@ -68,11 +68,10 @@ static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
            fitting->material.channel_names[c], alb_form_name(fitted->profile.form), fitted->total, fitted->total_sd,
            fitted->chi_square, fitted->degrees_of_freedom, 100 * outcome->rms_relative,
            fitted->identifiable ? "" : "  NOT DECIDED");
-    printf("%16s", "");
     for (int p = 0; p < alb_form_parameter_count(fitted->profile.form); p++)
-        printf("%s%c%d %.4g +- %.2g", p ? "  " : "", p % 2 ? 'b' : 'a', p / 2 + 1, fitted->profile.parameters[p],
-               fitted->sd[p]);
-    printf("\n%16sd ln S / dr %.5g +- %.2g per mm from %.4g to %.4g mm\n", "", outcome->slope_per_mm, outcome->slope_sd,
+        printf("%16s%-22s %.5g +- %.2g\n", "", alb_form_parameter_name(fitted->profile.form, p),
+               fitted->profile.parameters[p], fitted->sd[p]);
+    printf("%16sd ln S / dr %.5g +- %.2g per mm from %.4g to %.4g mm\n", "", outcome->slope_per_mm, outcome->slope_sd,
            outcome->slope_from_mm, outcome->slope_to_mm);
 }
 
@@ -178,7 +177,7 @@ static bool write_results(const alb_fitting *fitting, const alb_map *map, const 
     const char *said = notes->bytes ? notes->bytes : "";
     if (!alb_file_make_directory(r->out, error) ||
         !(map->columns ? alb_map_write(map, fitting, provenance, said, r->out, error)
-                       : alb_fitting_report(fitting, said, r->out, error)) ||
+                       : alb_fitting_report(fitting, provenance, said, r->out, error)) ||
         !alb_material_write(fitting, provenance, r->out, error))
         return false;
     if (r->as_json) {

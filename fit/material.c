@@ -14,8 +14,9 @@ static void find_properties(alb_fitting *fitting)
     alb_properties_find(fitting->properties, &fitting->material, &fitting->basis);
     for (int c = 0; c < 3; c++) {
         const alb_optical *optical = &fitting->properties[c].optical;
-        fitting->material.optical[c] = (alb_optical_estimate){fitting->properties[c].known, optical->absorption_per_mm,
-                                                              optical->reduced_scattering_per_mm};
+        fitting->material.optical[c] =
+            (alb_optical_estimate){fitting->properties[c].known && !fitting->properties[c].half_space,
+                                   optical->absorption_per_mm, optical->reduced_scattering_per_mm};
     }
 }
 
