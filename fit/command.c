@@ -133,6 +133,14 @@ static void examine(alb_fitting *fitting, bool absolute, alb_text *notes, alb_er
                              "measured energy is kept.\n",
                              alb_side_names[side], material->channel_names[c],
                              alb_form_name(outcome->fitted.profile.form), 100 * outcome->discrepancy_relative);
+            if (outcome->offset_sd > 0)
+                alb_text_add(notes,
+                             "%s %s: a constant of %.4g +- %.2g was in all readings (stray light, or the "
+                             "background) and is taken off.\n",
+                             alb_side_names[side], material->channel_names[c], outcome->offset, outcome->offset_sd);
+            if (*outcome->offset_instead)
+                alb_text_add(notes, "%s %s: %s.\n", alb_side_names[side], material->channel_names[c],
+                             outcome->offset_instead);
             held |= outcome->fitted.total < outcome->free_total;
             if (outcome->fitted.total < outcome->free_total)
                 alb_text_add(notes,
