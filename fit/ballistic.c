@@ -103,18 +103,19 @@ static bool worth_looking(const alb_outcome *outcome, double reach_mm)
 static void take(alb_outcome *outcome, const alb_outcome *beyond, const straight *light, double to_mm,
                  alb_common_sd common)
 {
+    const alb_outcome before = *outcome;
     *outcome = *beyond;
+    outcome->offset = before.offset; // the readings are without it
+    outcome->offset_sd = before.offset_sd;
     outcome->fitted.total_sd = hypot(outcome->fitted.total_sd, light->unmeasured);
     outcome->ballistic_share = light->share;
     outcome->ballistic_sd = hypot(hypot(light->sd, light->unmeasured), light->share * common.flux);
     outcome->ballistic_to_mm = to_mm;
 }
 
-bool alb_choose_behind(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward,
-                       alb_common_sd common, alb_error *error)
+bool alb_ballistic_find(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward,
+                        alb_common_sd common, alb_error *error)
 {
-    if (!alb_choose(outcome, readings, forward, common, error))
-        return false;
     bool ok = false;
     alb_error refused = {0};
     alb_readings beyond;

@@ -12,14 +12,16 @@ static const char usage[] =
     "       alabaster fit --image R.exr [--transmission T.exr] --mm-per-pixel S [--spot-radius-mm P] -o DIR [--json]\n"
     "       alabaster fit --table PROFILE.csv --side reflection|transmission -o DIR [--json]\n"
     "\n"
-    "Fits per channel and side the profile S(r), radiant exitance per incident flux, 1/mm^2, with the simplest of one\n"
-    "exponential, two, two with one negative amplitude, or three that the noise does not reject.\n"
-    "Writes DIR/material.json and DIR/report/fit.html, fit.svg, fit.csv. DIR is SESSION where it is not given.\n"
+    "Fits per channel and side the profile S(r), radiant exitance per incident flux, 1/mm^2, with the simplest\n"
+    "form that the noise does not reject. Writes DIR/material.json and DIR/report/fit.html, fit.json, fit.svg,\n"
+    "fit.csv. DIR is SESSION where it is not given.\n"
     "\n"
-    "Images are looked at square on and hold radiant exitance per incident flux in 1/mm^2; in another unit the "
-    "amplitudes\n"
-    "and totals are in that unit. Pixels are samples of S seen through a flat round spot of radius P (0: a pencil "
-    "beam).\n"
+    "Where the session holds a grid of spots on the slab and no single one, every spot is fitted: DIR/map/*.exr,\n"
+    "map.json, report/map.html, and the mean as material.json. It says whether the sample is alike everywhere.\n"
+    "\n"
+    "Images are looked at square on and hold radiant exitance per incident flux in 1/mm^2; in another unit the\n"
+    "amplitudes and totals are in that unit. Pixels are samples of S seen through a flat round spot of radius P\n"
+    "(0: a pencil beam).\n"
     "A table has the columns r_mm,value_per_mm2 and optionally sd_per_mm2.\n"
     "\n"
     "Of a slab of known thickness and index seen from both sides it gives absorption and reduced scattering by\n"
@@ -131,6 +133,14 @@ static void examine(alb_fitting *fitting, bool absolute, alb_text *notes, alb_er
                              "measured energy is kept.\n",
                              alb_side_names[side], material->channel_names[c],
                              alb_form_name(outcome->fitted.profile.form), 100 * outcome->discrepancy_relative);
+            if (outcome->offset_sd > 0)
+                alb_text_add(notes,
+                             "%s %s: a constant of %.4g +- %.2g was in all readings (stray light, or the "
+                             "background) and is taken off.\n",
+                             alb_side_names[side], material->channel_names[c], outcome->offset, outcome->offset_sd);
+            if (*outcome->offset_instead)
+                alb_text_add(notes, "%s %s: %s.\n", alb_side_names[side], material->channel_names[c],
+                             outcome->offset_instead);
             held |= outcome->fitted.total < outcome->free_total;
             if (outcome->fitted.total < outcome->free_total)
                 alb_text_add(notes,

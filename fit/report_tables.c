@@ -171,7 +171,11 @@ void alb_report_properties(alb_page *page, const alb_fitting *fitting)
             if (o->flags >> i & 1)
                 snprintf(flags + strlen(flags), sizeof flags - strlen(flags), "%s%s", *flags ? "; " : "",
                          alb_optical_flag_text(i));
-        if (p->known)
+        if (p->known && p->half_space)
+            alb_page_row(page, "%s|–|–|%.4g ± %.2g|–|–|as of a half-space; g = %g assumed%s%s",
+                         fitting->material.channel_names[c], o->reduced_albedo, o->reduced_albedo_sd, p->anisotropy,
+                         *flags ? "; " : "", flags);
+        else if (p->known)
             alb_page_row(page, "%s|%.4g ± %.2g|%.4g ± %.2g|%.4g ± %.2g|%+.2g %%, %+.2g %%|%+.2f|g = %g assumed%s%s",
                          fitting->material.channel_names[c], o->absorption_per_mm, o->absorption_sd,
                          o->reduced_scattering_per_mm, o->reduced_scattering_sd, o->reduced_albedo,
@@ -182,7 +186,7 @@ void alb_report_properties(alb_page *page, const alb_fitting *fitting)
                          *p->refused ? p->refused : "not tried");
     }
     alb_page_end_table(page);
-    alb_page_paragraph(page, "By radiative transfer (adding-doubling) from the totals of both sides.");
+    alb_page_paragraph(page, "By radiative transfer (adding-doubling) from the totals.");
 }
 
 static void put_readings(alb_page *page, const char *side, const char *channel, const alb_measurement *measurement)

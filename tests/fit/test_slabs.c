@@ -27,8 +27,9 @@ static void fit_slab(alb_outcome *outcome, alb_readings *readings, alb_operator 
     assert_true(slabs_readings(readings, &tallies[s], side, ballistic));
     check_ok(alb_spot_disc(&spot, slabs_spot_mm, &error), &error);
     check_ok(alb_operator_create(forward, readings, &spot, &error), &error);
-    check_ok((ballistic ? alb_choose_behind : alb_choose)(outcome, readings, forward, (alb_common_sd){0, 0}, &error),
-             &error);
+    check_ok(alb_choose(outcome, readings, forward, (alb_common_sd){0, 0}, &error), &error);
+    if (ballistic)
+        check_ok(alb_ballistic_find(outcome, readings, forward, (alb_common_sd){0, 0}, &error), &error);
     alb_spot_free(&spot);
 }
 
