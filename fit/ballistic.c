@@ -19,7 +19,7 @@
 
 static const double core_relative_sd = 0.1, spot_relative_sd = 0.05, reject_tail = 1e-3;
 static const double misfit_of_a_spike = 0.03; // it leaves 5 % and more
-static const double narrow = 3;               // decays times the reach of the spot
+static const double narrow = 1.5;             // decays times the reach of the spot
 
 // Irradiance of the spot at the readings, 1/mm^2, and how many of the first readings it reaches with a hundredth of the
 // most; *most 0: the readings are values of S, and none is at 0.
