@@ -1,8 +1,8 @@
-// Weighted least squares on p = (ln sigma_a, ln sigma_s', ln c) of
-//     readings_i = c (W S(sigma_a, sigma_s'))_i,  W the readings' operator (operator.h), S by transport (slab.h),
-// with ln c known to the calibration's sd; by Gauss and Newton's steps, derivatives by central differences of a model
-// without noise. The inverse of J^T J is Cramer and Rao's bound and, times chi-square per degree of freedom where that
-// is above 1, the covariance.
+// Weighted least squares on p = (ln sigma_a, ln sigma_s', ln c, ln b) of
+//     readings_i = c (of transmission: c b) (W S(sigma_a, sigma_s'))_i,  W the readings' operator (operator.h), S by
+// transport (slab.h), with ln c and ln b known to the calibration's sds; by Gauss and Newton's steps, derivatives by
+// central differences of a model without noise. The inverse of J^T J is Cramer and Rao's bound and, times chi-square
+// per degree of freedom where that is above 1, the covariance.
 //
 // What is used: readings of which less than 2 % comes from within half a transport mean free path of the beam, where
 // the model is worse than elsewhere and where the light that has not scattered arrives. The model's accuracy is one sd
@@ -21,10 +21,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PARAMETERS = ALB_JOINT_PARAMETERS, GRID = 24, STEPS_MAX = 16 };
+enum { PARAMETERS = ALB_JOINT_PARAMETERS, PRIORS = PARAMETERS - ALB_JOINT_SCALE, GRID = 24, STEPS_MAX = 16 };
 static const double near_mfp = 0.5, near_share = 0.02, accuracy = 1.5e-3, accuracy_span = 0.2, difference = 0.01,
                     settled = 1e-4;
-static const double reach[PARAMETERS] = {1.5, 0.4, 0.2}; // of one step
+static const double reach[PARAMETERS] = {1.5, 0.4, 0.2, 0.2}; // of one step
 
 // One row: a reading, the face it is of, its row of the operator and the sd to weigh it with.
 typedef struct row {
@@ -36,8 +36,8 @@ typedef struct problem {
     const alb_joint_side *sides;
     const alb_joint_known *known;
     row *rows;
-    int count; // of rows; the scale's prior is one more residual
-    double end_mm, point[PARAMETERS];
+    int count; // of rows; what is known of the factors are PRIORS more residuals
+    double prior_sd[PRIORS], end_mm, point[PARAMETERS];
     double (*on_grid)[ALB_OPERATOR_COLUMNS], (*columns[ALB_SIDES])[ALB_OPERATOR_COLUMNS];
 } problem;
 
@@ -86,15 +86,19 @@ static void evaluate(double *residuals, double *jacobian, const double *paramete
     for (int i = 0; i < p->count; i++) {
         const row *at = &p->rows[i];
         const double *here = p->columns[at->side][at->index], slope[2] = {here[1] / here[0], here[2] / here[0]};
-        const double model = here[0] * exp(slope[0] * (parameters[0] - p->point[0]) +
-                                           slope[1] * (parameters[1] - p->point[1]) + parameters[2]);
+        const double model =
+            here[0] * exp(slope[0] * (parameters[0] - p->point[0]) + slope[1] * (parameters[1] - p->point[1]) +
+                          parameters[ALB_JOINT_SCALE] + (at->side ? parameters[ALB_JOINT_BALANCE] : 0));
         residuals[i] = at->weight * (model - at->value);
         for (int c = 0; jacobian && c < PARAMETERS; c++)
-            jacobian[i * PARAMETERS + c] = at->weight * model * (c == ALB_JOINT_SCALE ? 1 : slope[c]);
+            jacobian[i * PARAMETERS + c] =
+                at->weight * model * (c < 2 ? slope[c] : c == ALB_JOINT_SCALE || at->side == ALB_TRANSMISSION);
     }
-    residuals[p->count] = parameters[ALB_JOINT_SCALE] / p->known->scale_relative_sd;
-    for (int c = 0; jacobian && c < PARAMETERS; c++)
-        jacobian[p->count * PARAMETERS + c] = c == ALB_JOINT_SCALE ? 1 / p->known->scale_relative_sd : 0;
+    for (int k = 0; k < PRIORS; k++) {
+        residuals[p->count + k] = parameters[ALB_JOINT_SCALE + k] / p->prior_sd[k];
+        for (int c = 0; jacobian && c < PARAMETERS; c++)
+            jacobian[(p->count + k) * PARAMETERS + c] = c == ALB_JOINT_SCALE + k ? 1 / p->prior_sd[k] : 0;
+    }
 }
 
 // How badly diffusion misses the readings at these parameters, the factor fitted as far as it is open.
@@ -120,6 +124,7 @@ static void start(double parameters[PARAMETERS], const problem *p)
 {
     const alb_diffusion_face face = alb_diffusion_face_at(ALB_DIFFUSION_GROSJEAN, p->known->refractive_index);
     double best = INFINITY;
+    parameters[ALB_JOINT_SCALE] = parameters[ALB_JOINT_BALANCE] = 0;
     for (int i = 0; i < GRID; i++)
         for (int j = 0; j < GRID; j++) {
             const double scattering = 0.5 / p->known->thickness_mm * pow(1000, (double)i / (GRID - 1));
@@ -127,7 +132,7 @@ static void start(double parameters[PARAMETERS], const problem *p)
             const double misfit = diffusion_misfit(p, &face, absorption, scattering);
             if (misfit < best) {
                 best = misfit;
-                parameters[0] = log(absorption), parameters[1] = log(scattering), parameters[2] = 0;
+                parameters[0] = log(absorption), parameters[1] = log(scattering);
             }
         }
 }
@@ -214,10 +219,10 @@ static bool invert(double inverse[PARAMETERS][PARAMETERS], double a[PARAMETERS][
 static void weigh_up(alb_joint *joint, const double *parameters, const problem *p, double *jacobian)
 {
     double information[PARAMETERS][PARAMETERS] = {{0}}, bound[PARAMETERS][PARAMETERS];
-    joint->degrees_of_freedom = p->count + 1 - PARAMETERS;
+    joint->degrees_of_freedom = p->count + PRIORS - PARAMETERS;
     joint->undecided[0] = 0;
-    evaluate(jacobian + (p->count + 1) * PARAMETERS, jacobian, parameters, p);
-    for (int i = 0; i <= p->count; i++)
+    evaluate(jacobian + (p->count + PRIORS) * PARAMETERS, jacobian, parameters, p);
+    for (int i = 0; i < p->count + PRIORS; i++)
         for (int a = 0; a < PARAMETERS; a++)
             for (int b = 0; b < PARAMETERS; b++)
                 information[a][b] += jacobian[i * PARAMETERS + a] * jacobian[i * PARAMETERS + b];
@@ -238,7 +243,7 @@ static double misfit(double *residuals, const double *parameters, const problem 
 {
     double sum = 0;
     evaluate(residuals, NULL, parameters, p);
-    for (int i = 0; i <= p->count; i++)
+    for (int i = 0; i < p->count + PRIORS; i++)
         sum += residuals[i] * residuals[i];
     return sum;
 }
@@ -265,7 +270,7 @@ static bool minimise(alb_joint *joint, double *parameters, problem *p, double *j
             lower[c] = best[c] - reach[c];
             upper[c] = best[c] + reach[c];
         }
-        const alb_problem least_squares = {PARAMETERS, p->count + 1, evaluate, p, lower, upper};
+        const alb_problem least_squares = {PARAMETERS, p->count + PRIORS, evaluate, p, lower, upper};
         if (!alb_solve(parameters, &joint->chi_square, &least_squares, error))
             return false;
         if (stalled || now - joint->chi_square < settled)
@@ -280,7 +285,8 @@ static void conclude(alb_joint *joint, const double *parameters, const problem *
     const alb_slab slab = slab_at(p->known, parameters[0], parameters[1]);
     joint->absorption_per_mm = slab.absorption_per_mm;
     joint->reduced_scattering_per_mm = exp(parameters[1]);
-    joint->scale = exp(parameters[2]);
+    joint->scale = exp(parameters[ALB_JOINT_SCALE]);
+    joint->balance = exp(parameters[ALB_JOINT_BALANCE]);
     joint->unscattered = alb_slab_scale(&slab, ALB_HARMONICS_ORDER).beam.leaving[ALB_TRANSMISSION];
     const double sigma = joint->absorption_per_mm + joint->reduced_scattering_per_mm;
     joint->albedo = joint->reduced_scattering_per_mm / sigma;
@@ -305,7 +311,8 @@ static bool check_request(const alb_joint_side sides[ALB_SIDES], const alb_joint
         return alb_fail(error, ALB_UNDECIDED,
                         "transmission alone does not tell absorption from scattering: give the reflection as well");
     if (!(known->thickness_mm > 0 && known->refractive_index >= 1 && known->refractive_index <= 3 &&
-          known->anisotropy >= 0 && known->anisotropy <= 0.95 && known->scale_relative_sd > 0))
+          known->anisotropy >= 0 && known->anisotropy <= 0.95 && known->scale_relative_sd > 0 &&
+          known->balance_relative_sd >= 0))
         return alb_fail(error, ALB_BAD_DATA,
                         "a slab of thickness %g mm, index %g (1 to 3), g %g (0 to 0.95), scale known to %g: thickness "
                         "and scale's sd are to be above zero",
@@ -329,14 +336,15 @@ static bool allocate(problem *p, double **jacobian, alb_error *error)
     }
     return (p->rows = alb_allocate(rows, sizeof *p->rows, error)) &&
            (p->on_grid = alb_allocate(grid, sizeof *p->on_grid, error)) &&
-           (*jacobian = alb_allocate((rows + 1) * (PARAMETERS + 1), sizeof **jacobian, error));
+           (*jacobian = alb_allocate((rows + PRIORS) * (PARAMETERS + 1), sizeof **jacobian, error));
 }
 
 bool alb_joint_fit(alb_joint *joint, const alb_joint_side sides[ALB_SIDES], const alb_joint_known *known,
                    alb_error *error)
 {
     *joint = (alb_joint){0};
-    problem p = {.sides = sides, .known = known};
+    problem p = {
+        .sides = sides, .known = known, .prior_sd = {known->scale_relative_sd, fmax(known->balance_relative_sd, 1e-6)}};
     double *jacobian = NULL, parameters[PARAMETERS];
     bool ok = check_request(sides, known, error) && allocate(&p, &jacobian, error);
     if (!ok)

@@ -12,6 +12,19 @@ static void find_properties(alb_fitting *fitting)
     for (int i = 0; i < ALB_SIDES * 3; i++)
         fitting->basis.common_sd[i / 3][i % 3] = fitting->sides[i / 3][i % 3].common.flux;
     alb_properties_find(fitting->properties, &fitting->material, &fitting->basis);
+    if (!fitting->absolute || !(fitting->material.thickness_mm > 0) || fitting->basis.finish != ALB_FINISH_SMOOTH)
+        return;
+    for (int c = 0; c < fitting->material.channels; c++) {
+        alb_joint_side sides[ALB_SIDES] = {{0}};
+        for (int side = 0; side < ALB_SIDES; side++)
+            if (fitting->sides[side][c].measured)
+                sides[side] = (alb_joint_side){&fitting->sides[side][c].readings, &fitting->sides[side][c].forward};
+        const alb_joint_known known = {fitting->material.thickness_mm, fitting->material.refractive_index,
+                                       fitting->basis.anisotropy, fitting->sides[0][c].common.flux,
+                                       M_SQRT2 * fitting->basis.own_sd};
+        if (sides[ALB_REFLECTION].readings && sides[ALB_TRANSMISSION].readings)
+            alb_image_properties_find(&fitting->properties[c].images, sides, &known);
+    }
 }
 
 bool alb_fitting_run(alb_fitting *fitting, alb_error *error)

@@ -97,6 +97,7 @@ void alb_properties_put(alb_json *json, const alb_properties *p)
     } else {
         alb_json_string(json, "refused", p->refused);
     }
+    alb_image_properties_put(json, &p->images);
     alb_json_end_object(json);
 }
 
@@ -105,6 +106,7 @@ void alb_properties_note(alb_text *notes, const char *channel, const alb_propert
     const alb_optical *o = &p->optical;
     if (*p->refused)
         alb_text_add(notes, "%s: no optical properties: %s.\n", channel, p->refused);
+    alb_image_properties_note(notes, channel, &p->images);
     if (!p->known)
         return;
     alb_text_add(notes,
@@ -135,15 +137,15 @@ bool alb_properties_check(alb_node channel, alb_error *error)
     if (!alb_node_has(channel, "optical_properties"))
         return true;
     if (!alb_node_object(&properties, channel, "optical_properties", error) ||
-        !alb_node_text(&text, properties, "method", error))
+        !alb_node_text(&text, properties, "method", error) || !alb_image_properties_check(properties, error))
         return false;
     if (alb_node_has(properties, "refused"))
-        return alb_node_allow(properties, "method refused", error) &&
+        return alb_node_allow(properties, "method refused images", error) &&
                alb_node_text(&text, properties, "refused", error);
     if (!alb_node_allow(properties,
                         "method anisotropy_assumed absorption_per_mm reduced_scattering_per_mm correlation "
                         "reduced_albedo relative_change_by_scale relative_change_by_thickness with_other_anisotropy "
-                        "by_diffusion flags",
+                        "by_diffusion flags images",
                         error) ||
         !alb_node_number(&value, properties, "anisotropy_assumed", -1, 1, error) ||
         !alb_node_number(&value, properties, "correlation", -1.001, 1.001, error) ||

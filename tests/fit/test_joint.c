@@ -134,13 +134,13 @@ static void refuses_what_does_not_decide(void **state)
     const slab_rings *rings = &slabs[MARBLE];
     alb_readings readings[ALB_SIDES] = {{0}};
     check_ok(slab_rings_photograph(readings, rings, noise, 1, 0, &error), &error);
-    alb_joint_known known = {rings->slab.thickness_mm, 1.5, 0, scale_sd};
+    alb_joint_known known = {rings->slab.thickness_mm, 1.5, 0, scale_sd, 0};
     const alb_joint_side transmission[ALB_SIDES] = {{0}, {&readings[1], &rings->forward[1]}};
     check_fails(alb_joint_fit(&joint, transmission, &known, &error), &error, ALB_UNDECIDED, "transmission alone");
     const alb_joint_side both[ALB_SIDES] = {{&readings[0], &rings->forward[0]}, {&readings[1], &rings->forward[1]}};
     known.thickness_mm = 0;
     check_fails(alb_joint_fit(&joint, both, &known, &error), &error, ALB_BAD_DATA, "thickness");
-    known = (alb_joint_known){rings->slab.thickness_mm, NAN, 0, scale_sd};
+    known = (alb_joint_known){rings->slab.thickness_mm, NAN, 0, scale_sd, 0};
     check_fails(alb_joint_fit(&joint, both, &known, &error), &error, ALB_BAD_DATA, "index");
     known.refractive_index = 1.5;
     for (int side = 0; side < ALB_SIDES; side++)
