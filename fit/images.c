@@ -30,12 +30,13 @@ void alb_image_properties_put(alb_json *json, const alb_image_properties *p)
     alb_json_object(json, "images");
     if (p->known) {
         const double used[ALB_SIDES] = {j->used[0], j->used[1]};
-        alb_json_string(json, "method", "radiative transport of the readings of both sides, scale free");
+        alb_json_string(json, "method", "radiative transport of the readings of both sides, scale and anisotropy free");
         alb_json_estimate(json, "absorption_per_mm", j->absorption_per_mm, j->absorption_per_mm * j->relative_sd[0]);
         alb_json_estimate(json, "reduced_scattering_per_mm", j->reduced_scattering_per_mm,
                           j->reduced_scattering_per_mm * j->relative_sd[1]);
         alb_json_number(json, "correlation", correlation(j));
-        alb_json_numbers(json, "relative_bound", j->relative_bound, ALB_JOINT_SCALE);
+        alb_json_numbers(json, "relative_bound", j->relative_bound, ALB_JOINT_ANISOTROPY);
+        alb_json_estimate(json, "anisotropy", j->anisotropy, j->relative_sd[ALB_JOINT_ANISOTROPY]);
         alb_json_estimate(json, "scale", j->scale, j->scale * j->relative_sd[ALB_JOINT_SCALE]);
         alb_json_estimate(json, "transmission_over_reflection", j->balance,
                           j->balance * j->relative_sd[ALB_JOINT_BALANCE]);
@@ -59,10 +60,10 @@ void alb_image_properties_note(alb_text *notes, const char *channel, const alb_i
         alb_text_add(
             notes,
             "%s: absorption %.4g +- %.2g, reduced scattering %.4g +- %.2g per mm by radiative transport from the "
-            "images, scale %.4g +- %.2g fitted, chi-square %.4g / %d.\n",
+            "images, anisotropy %.3g +- %.2g and scale %.4g +- %.2g fitted, chi-square %.4g / %d.\n",
             channel, j->absorption_per_mm, j->absorption_per_mm * j->relative_sd[0], j->reduced_scattering_per_mm,
-            j->reduced_scattering_per_mm * j->relative_sd[1], j->scale, j->scale * j->relative_sd[ALB_JOINT_SCALE],
-            j->chi_square, j->degrees_of_freedom);
+            j->reduced_scattering_per_mm * j->relative_sd[1], j->anisotropy, j->relative_sd[ALB_JOINT_ANISOTROPY],
+            j->scale, j->scale * j->relative_sd[ALB_JOINT_SCALE], j->chi_square, j->degrees_of_freedom);
 }
 
 bool alb_image_properties_check(alb_node object, alb_error *error)
@@ -78,10 +79,11 @@ bool alb_image_properties_check(alb_node object, alb_error *error)
         return false;
     if (alb_node_has(images, "refused"))
         return alb_node_allow(images, "refused", error) && alb_node_text(&text, images, "refused", error);
-    if (!alb_node_allow(images,
-                        "method absorption_per_mm reduced_scattering_per_mm correlation relative_bound scale "
-                        "transmission_over_reflection chi_square degrees_of_freedom readings from_mm unscattered_share",
-                        error) ||
+    if (!alb_node_allow(
+            images,
+            "method absorption_per_mm reduced_scattering_per_mm correlation relative_bound anisotropy scale "
+            "transmission_over_reflection chi_square degrees_of_freedom readings from_mm unscattered_share",
+            error) ||
         !alb_node_number(&value, images, "correlation", -1.001, 1.001, error) ||
         !alb_node_number(&value, images, "chi_square", 0, 1e300, error))
         return false;

@@ -89,8 +89,8 @@ static inline bool slab_rings_fit(alb_joint *joint, const slab_rings *rings, dou
                                   double scale_sd, uint64_t trial, bool one_side, alb_error *error)
 {
     alb_readings readings[ALB_SIDES] = {{0}};
-    const alb_joint_known known = {rings->slab.thickness_mm, rings->slab.refractive_index, rings->slab.anisotropy,
-                                   scale_sd, 0};
+    const alb_joint_known known = {
+        rings->slab.thickness_mm, rings->slab.refractive_index, rings->slab.anisotropy, 0, scale_sd, 0};
     bool ok = slab_rings_photograph(readings, rings, noise, scale, trial, error);
     alb_joint_side sides[ALB_SIDES] = {{&readings[0], &rings->forward[0]}, {&readings[1], &rings->forward[1]}};
     if (one_side)
