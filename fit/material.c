@@ -1,6 +1,7 @@
 // material.json: written by fit, read strictly by render.
 #include "base/record.h"
 #include "fit/energy.h"
+#include "fit/offset.h"
 #include "fit/profile.h"
 #include "fit/search.h"
 #include <math.h>
@@ -12,6 +13,18 @@ static void find_properties(alb_fitting *fitting)
     for (int i = 0; i < ALB_SIDES * 3; i++)
         fitting->basis.common_sd[i / 3][i % 3] = fitting->sides[i / 3][i % 3].common.flux;
     alb_properties_find(fitting->properties, &fitting->material, &fitting->basis);
+    for (int c = 0; c < 3; c++) {
+        const alb_optical *optical = &fitting->properties[c].optical;
+        fitting->material.optical[c] =
+            (alb_optical_estimate){fitting->properties[c].known && !fitting->properties[c].half_space,
+                                   optical->absorption_per_mm, optical->reduced_scattering_per_mm};
+    }
+}
+
+// The same slabs by their images. The anisotropy is the caller's guess: left open, as far as the images decide it.
+static void find_images(alb_fitting *fitting)
+{
+    const double anisotropy_sd = 0.5;
     if (!fitting->absolute || !(fitting->material.thickness_mm > 0) || fitting->basis.finish != ALB_FINISH_SMOOTH)
         return;
     for (int c = 0; c < fitting->material.channels; c++) {
@@ -20,7 +33,7 @@ static void find_properties(alb_fitting *fitting)
             if (fitting->sides[side][c].measured)
                 sides[side] = (alb_joint_side){&fitting->sides[side][c].readings, &fitting->sides[side][c].forward};
         const alb_joint_known known = {fitting->material.thickness_mm,   fitting->material.refractive_index,
-                                       fitting->basis.anisotropy,        0.5,
+                                       fitting->basis.anisotropy,        anisotropy_sd,
                                        fitting->sides[0][c].common.flux, M_SQRT2 * fitting->basis.own_sd};
         if (sides[ALB_REFLECTION].readings && sides[ALB_TRANSMISSION].readings)
             alb_image_properties_find(&fitting->properties[c].images, sides, &known);
@@ -35,8 +48,7 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
         alb_measurement *measurement = &fitting->sides[i / 3][i % 3];
         if (!measurement->forward.grid_mm)
             continue;
-        measurement->measured = alb_choose(&measurement->outcome, &measurement->readings, &measurement->forward,
-                                           measurement->common, &reasons[i]);
+        measurement->measured = alb_offset_choose(measurement, &reasons[i]);
     }
     for (int i = 0; i < ALB_SIDES * 3; i++)
         if (reasons[i].status != ALB_OK)
@@ -49,6 +61,7 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
         if (fitting->sides[i / 3][i % 3].measured)
             fitting->material.fitted[i / 3][i % 3] = fitting->sides[i / 3][i % 3].outcome.fitted;
     find_properties(fitting);
+    find_images(fitting);
     return true;
 }
 
@@ -127,6 +140,12 @@ static void put_outcome(alb_json *json, const char *side, const alb_outcome *out
     alb_json_end_list(json);
     alb_json_number(json, "condition", outcome->knowledge.condition);
     put_known(json, "total", fitted->total, fitted->total_sd, &outcome->knowledge.total, false);
+    alb_json_number(json, "total_without_inner_fifth", outcome->sensitivity.without_inner);
+    alb_json_number(json, "total_without_outer_fifth", outcome->sensitivity.without_outer);
+    if (outcome->offset_sd > 0)
+        alb_json_estimate(json, "offset_per_mm2", outcome->offset, outcome->offset_sd);
+    if (*outcome->offset_instead)
+        alb_json_string(json, "offset_instead", outcome->offset_instead);
     if (fitted->total < outcome->free_total) {
         alb_json_object(json, "energy_held");
         alb_json_number(json, "free_total", outcome->free_total);
@@ -232,12 +251,12 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
     const char *form;
     long freedom;
     alb_node total;
-    if (!alb_node_allow(
-            node,
-            "form decay_ratio_held identifiable best_guess undecided parameters covariance condition total energy_held "
-            "chi_square degrees_of_freedom "
-            "errors_from discrepancy_relative rms_relative measured_share_of_total tail_slope_per_mm tried",
-            error) ||
+    if (!alb_node_allow(node,
+                        "form decay_ratio_held identifiable best_guess undecided parameters covariance condition total "
+                        "total_without_inner_fifth total_without_outer_fifth offset_per_mm2 offset_instead energy_held "
+                        "chi_square degrees_of_freedom errors_from discrepancy_relative rms_relative "
+                        "measured_share_of_total tail_slope_per_mm tried",
+                        error) ||
         !alb_node_text(&form, node, "form", error))
         return false;
     if (!alb_form_from_name(&fitted->profile.form, form))
@@ -285,7 +304,7 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
         snprintf(material->channel_names[c], sizeof material->channel_names[0], "%s", key);
         if (!alb_node_object(&channel, channels, key, error) ||
             !alb_node_allow(channel, "reflection transmission optical_properties", error) ||
-            !alb_properties_check(channel, error))
+            !alb_properties_read(&material->optical[c], channel, error))
             return false;
         for (int side = 0; side < ALB_SIDES; side++)
             if (alb_node_has(channel, alb_side_names[side]) &&

@@ -80,7 +80,7 @@ static void reasons_not_to(void **state)
     assert_true(!p[0].known && !*p[0].refused);
 }
 
-static bool round_trip(const alb_properties *p, alb_error *error)
+static bool round_trip(alb_optical_estimate *out, const alb_properties *p, alb_error *error)
 {
     alb_json json;
     alb_json_begin(&json, NULL);
@@ -89,10 +89,35 @@ static bool round_trip(const alb_properties *p, alb_error *error)
         return false;
     alb_record *record = alb_record_read("properties.json.tmp", error);
     alb_node root;
-    const bool ok = record && alb_record_root(&root, record, error) && alb_properties_check(root, error);
+    const bool ok = record && alb_record_root(&root, record, error) && alb_properties_read(out, root, error);
     alb_record_free(record);
     remove("properties.json.tmp");
     return ok;
+}
+
+// Reflection alone: the ratio, and no other number.
+static void one_side_only(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_material material = marble(0.01);
+    const alb_medium deep = {0.0041, 2.62, 0, 1.5, 200};
+    double totals[2];
+    discrete_ordinates(totals, &deep);
+    material.fitted[0][0].total = totals[0];
+    material.fitted[1][0] = (alb_fitted){0};
+    const alb_properties_basis basis = {0};
+    alb_properties p[3];
+    alb_optical_estimate read;
+    alb_properties_find(p, &material, &basis);
+    assert_true(p[0].known && p[0].half_space);
+    check_relative(1 - p[0].optical.reduced_albedo, 0.0041 / 2.6241, 0.005);
+    check_ok(round_trip(&read, &p[0], &error), &error);
+    assert_false(read.known);
+    alb_text notes = {0};
+    alb_properties_note(&notes, "G", &p[0]);
+    assert_non_null(strstr(notes.bytes, "want both sides"));
+    alb_text_free(&notes);
 }
 
 static void written_and_read(void **state)
@@ -102,22 +127,25 @@ static void written_and_read(void **state)
     alb_material material = marble(0.01);
     const alb_properties_basis smooth = {0}, ground = {.finish = ALB_FINISH_GROUND};
     alb_properties p[3];
+    alb_optical_estimate read;
     alb_properties_find(p, &material, &smooth);
-    check_ok(round_trip(&p[0], &error), &error);
-    check_ok(round_trip(&p[1], &error), &error); // not tried: nothing is written
+    check_ok(round_trip(&read, &p[0], &error), &error);
+    assert_true(read.known && read.absorption_per_mm == p[0].optical.absorption_per_mm &&
+                read.reduced_scattering_per_mm == p[0].optical.reduced_scattering_per_mm);
+    check_ok(round_trip(&read, &p[1], &error), &error); // not tried: nothing is written
+    assert_false(read.known);
     p[0].optical.absorption_per_mm = -1;
-    check_fails(round_trip(&p[0], &error), &error, ALB_BAD_DATA, "absorption_per_mm");
+    check_fails(round_trip(&read, &p[0], &error), &error, ALB_BAD_DATA, "absorption_per_mm");
     alb_properties_find(p, &material, &ground);
-    check_ok(round_trip(&p[0], &error), &error);
+    check_ok(round_trip(&read, &p[0], &error), &error);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(values_and_their_price),
-        cmocka_unit_test(shared_and_own_errors),
-        cmocka_unit_test(reasons_not_to),
-        cmocka_unit_test(written_and_read),
+        cmocka_unit_test(values_and_their_price), cmocka_unit_test(shared_and_own_errors),
+        cmocka_unit_test(reasons_not_to),         cmocka_unit_test(written_and_read),
+        cmocka_unit_test(one_side_only),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
