@@ -9,7 +9,7 @@
 
 static const char usage[] =
     "usage: alabaster fit SESSION [-o DIR] [--json]\n"
-    "       alabaster fit --image R.exr [--transmission T.exr] --mm-per-pixel S [--spot-radius-mm P] -o DIR [--json]\n"
+    "       alabaster fit --image R.exr [--transmission T.exr] --mm-per-pixel S [SPOT] [CURVED] -o DIR [--json]\n"
     "       alabaster fit --table PROFILE.csv --side reflection|transmission -o DIR [--json]\n"
     "\n"
     "Fits per channel and side the profile S(r), radiant exitance per incident flux, 1/mm^2, with the simplest of one\n"
@@ -18,30 +18,66 @@ static const char usage[] =
     "\n"
     "Images are looked at square on and hold radiant exitance per incident flux in 1/mm^2; in another unit the "
     "amplitudes\n"
-    "and totals are in that unit. Pixels are samples of S seen through a flat round spot of radius P (0: a pencil "
-    "beam).\n"
+    "and totals are in that unit. Pixels average S, lit by SPOT, over squares. SPOT is --spot-radius-mm P (a flat "
+    "disc; 0,\n"
+    "the default: a pencil beam), --spot-gaussian-mm W (irradiance falls to 1/e^2 at W) or --spot-image WHITE.exr "
+    "(its\n"
+    "photograph on an opaque white face). CURVED is --curvature-radius-mm R (a sphere that bulges towards the camera)\n"
+    "and --distance chord|arc: through the sample (default) or along its surface.\n"
     "A table has the columns r_mm,value_per_mm2 and optionally sd_per_mm2.\n"
     "\n"
     "Exit code 5: the data do not decide; the files hold the best guess, marked so, and say why.";
 
 typedef struct request {
     const char *session, *reflection, *transmission, *table, *side, *out;
-    double mm_per_pixel, spot_radius_mm;
+    alb_image_setting setting;
     bool as_json;
 } request;
 
-static bool check_request(request *r, const char *pixel, const char *radius, alb_error *error)
+// What goes with images alone, as it was typed.
+typedef struct image_texts {
+    const char *pixel, *radius, *gaussian, *curvature, *distance;
+} image_texts;
+
+static bool check_images(request *r, const image_texts *t, alb_error *error)
+{
+    alb_image_setting *setting = &r->setting;
+    const char *extra = t->radius             ? "--spot-radius-mm"
+                        : t->gaussian         ? "--spot-gaussian-mm"
+                        : setting->spot_image ? "--spot-image"
+                        : t->curvature        ? "--curvature-radius-mm"
+                                              : NULL;
+    if (extra && !r->reflection && !r->transmission)
+        return alb_fail(error, ALB_USAGE, "%s goes with --image", extra);
+    if ((t->radius != NULL) + (t->gaussian != NULL) + (setting->spot_image != NULL) > 1)
+        return alb_fail(error, ALB_USAGE,
+                        "one of --spot-radius-mm, --spot-gaussian-mm and --spot-image says what lights");
+    if (t->distance && !t->curvature)
+        return alb_fail(error, ALB_USAGE, "--distance goes with --curvature-radius-mm");
+    if (t->distance && strcmp(t->distance, alb_distance_names[0]) != 0 &&
+        strcmp(t->distance, alb_distance_names[1]) != 0)
+        return alb_fail(error, ALB_USAGE, "--distance %.40s: chord or arc is wanted", t->distance);
+    setting->distance = t->distance && strcmp(t->distance, alb_distance_names[ALB_DISTANCE_ARC]) == 0
+                            ? ALB_DISTANCE_ARC
+                            : ALB_DISTANCE_CHORD;
+    return (!t->pixel || alb_option_number(&setting->mm_per_pixel, "--mm-per-pixel", t->pixel, 1e-9, 1e9, error)) &&
+           (!t->radius || alb_option_number(&setting->spot_radius_mm, "--spot-radius-mm", t->radius, 0, 1e9, error)) &&
+           (!t->gaussian ||
+            alb_option_number(&setting->spot_gaussian_mm, "--spot-gaussian-mm", t->gaussian, 1e-9, 1e9, error)) &&
+           (!t->curvature ||
+            alb_option_number(&setting->curvature_radius_mm, "--curvature-radius-mm", t->curvature, 1e-9, 1e9, error));
+}
+
+static bool check_request(request *r, const image_texts *texts, alb_error *error)
 {
     const bool images = r->reflection || r->transmission;
     if ((r->session != NULL) + images + (r->table != NULL) != 1)
         return alb_fail(error, ALB_USAGE,
                         "one of SESSION, --image and --table is wanted; 'alabaster help fit' tells more");
-    if (images != (pixel != NULL))
+    if (images != (texts->pixel != NULL))
         return alb_fail(error, ALB_USAGE,
                         images ? "--image wants --mm-per-pixel: millimetres on the face between pixels"
                                : "--mm-per-pixel goes with --image");
-    if (radius && !images)
-        return alb_fail(error, ALB_USAGE, "--spot-radius-mm goes with --image");
     if ((r->table != NULL) != (r->side != NULL))
         return alb_fail(error, ALB_USAGE, "--table wants --side reflection or --side transmission, and only it does");
     if (r->side && strcmp(r->side, alb_side_names[0]) != 0 && strcmp(r->side, alb_side_names[1]) != 0)
@@ -50,8 +86,7 @@ static bool check_request(request *r, const char *pixel, const char *radius, alb
         return alb_fail(error, ALB_USAGE, "-o DIR is wanted: where material.json goes");
     if (!r->out)
         r->out = r->session;
-    return (!pixel || alb_option_number(&r->mm_per_pixel, "--mm-per-pixel", pixel, 1e-9, 1e9, error)) &&
-           (!radius || alb_option_number(&r->spot_radius_mm, "--spot-radius-mm", radius, 0, 1e9, error));
+    return check_images(r, texts, error);
 }
 
 static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
@@ -137,11 +172,25 @@ static bool fit_request(alb_fitting *fitting, alb_provenance *provenance, alb_te
             strcmp(r->side, alb_side_names[ALB_REFLECTION]) == 0 ? ALB_REFLECTION : ALB_TRANSMISSION, error);
     }
     const char *const paths[ALB_SIDES] = {r->reflection, r->transmission};
-    snprintf(provenance->options, sizeof provenance->options, "--mm-per-pixel %.9g --spot-radius-mm %.9g%s%s%s%s",
-             r->mm_per_pixel, r->spot_radius_mm, r->reflection ? " --image " : "",
-             r->reflection ? alb_path_name(r->reflection) : "", r->transmission ? " --transmission " : "",
-             r->transmission ? alb_path_name(r->transmission) : "");
-    return alb_fitting_from_images(fitting, provenance, notes, paths, r->mm_per_pixel, r->spot_radius_mm, error);
+    const alb_image_setting *setting = &r->setting;
+    alb_text options = {0};
+    alb_text_add(&options, "--mm-per-pixel %.9g", setting->mm_per_pixel);
+    if (setting->spot_image)
+        alb_text_add(&options, " --spot-image %s", alb_path_name(setting->spot_image));
+    else if (setting->spot_gaussian_mm > 0)
+        alb_text_add(&options, " --spot-gaussian-mm %.9g", setting->spot_gaussian_mm);
+    else
+        alb_text_add(&options, " --spot-radius-mm %.9g", setting->spot_radius_mm);
+    if (setting->curvature_radius_mm > 0)
+        alb_text_add(&options, " --curvature-radius-mm %.9g --distance %s", setting->curvature_radius_mm,
+                     alb_distance_names[setting->distance]);
+    for (int side = 0; side < ALB_SIDES; side++)
+        if (paths[side])
+            alb_text_add(&options, "%s%s", side == ALB_REFLECTION ? " --image " : " --transmission ",
+                         alb_path_name(paths[side]));
+    snprintf(provenance->options, sizeof provenance->options, "%s", options.bytes ? options.bytes : "");
+    alb_text_free(&options);
+    return alb_fitting_from_images(fitting, provenance, notes, paths, setting, error);
 }
 
 static bool write_results(const alb_fitting *fitting, const alb_provenance *provenance, const alb_text *notes,
@@ -167,18 +216,22 @@ static bool write_results(const alb_fitting *fitting, const alb_provenance *prov
 static bool run(int argc, char **argv, alb_error *error)
 {
     request r = {0};
-    const char *pixel = NULL, *radius = NULL;
+    image_texts texts = {0};
     const alb_option options[] = {{NULL, "SESSION", false, &r.session, NULL},
                                   {"--image", NULL, false, &r.reflection, NULL},
                                   {"--transmission", NULL, false, &r.transmission, NULL},
-                                  {"--mm-per-pixel", NULL, false, &pixel, NULL},
-                                  {"--spot-radius-mm", NULL, false, &radius, NULL},
+                                  {"--mm-per-pixel", NULL, false, &texts.pixel, NULL},
+                                  {"--spot-radius-mm", NULL, false, &texts.radius, NULL},
+                                  {"--spot-gaussian-mm", NULL, false, &texts.gaussian, NULL},
+                                  {"--spot-image", NULL, false, &r.setting.spot_image, NULL},
+                                  {"--curvature-radius-mm", NULL, false, &texts.curvature, NULL},
+                                  {"--distance", NULL, false, &texts.distance, NULL},
                                   {"--table", NULL, false, &r.table, NULL},
                                   {"--side", NULL, false, &r.side, NULL},
                                   {"-o", NULL, false, &r.out, NULL},
                                   {"--json", NULL, false, NULL, &r.as_json}};
     if (!alb_options_read(options, sizeof options / sizeof options[0], argc, argv, error) ||
-        !check_request(&r, pixel, radius, error))
+        !check_request(&r, &texts, error))
         return false;
     alb_provenance provenance = {.command = "fit"};
     alb_text notes = {0};
