@@ -13,51 +13,51 @@
 #include "fit/form.h"
 #include <math.h>
 
-// Parameters of a term: a, b and, where there are three, z.
-static int stride_of(const alb_form_row *row) { return row->parameter_count / row->term_count; }
+// Parameters of a term: a, b and, but for terms over r, z.
+static bool has_depth(const alb_form_row *row, int term)
+{
+    return row->stride * term + 2 < row->parameter_count && row->stride == 3;
+}
 
 static double sources_value(double *gradient, const alb_form_row *row, const double *p, double r_mm)
 {
-    const int stride = stride_of(row);
     double sum = 0;
-    for (int j = 0; j < row->term_count; j++, p += stride) {
-        const double z = stride == 3 ? p[2] : 0, rho = sqrt(r_mm * r_mm + z * z);
+    for (int j = 0; j < row->term_count; j++, p += row->stride) {
+        const double z = has_depth(row, j) ? p[2] : 0, rho = sqrt(r_mm * r_mm + z * z);
         const double further = rho > 0 ? r_mm * r_mm / (rho + z) : 0, unit = exp(-p[1] * further) / rho;
         sum += p[0] * unit;
         if (!gradient)
             continue;
         gradient[0] = unit;
         gradient[1] = -further * p[0] * unit;
-        if (stride == 3)
+        if (has_depth(row, j))
             gradient[2] = p[0] * unit * (p[1] * further - z / rho) / rho;
-        gradient += stride;
+        gradient += row->stride;
     }
     return sum;
 }
 
 static double sources_total(double *gradient, const alb_form_row *row, const double *p)
 {
-    const int stride = stride_of(row);
     double sum = 0;
-    for (int j = 0; j < row->term_count; j++, p += stride) {
+    for (int j = 0; j < row->term_count; j++, p += row->stride) {
         sum += 2 * M_PI * p[0] / p[1];
         if (!gradient)
             continue;
         gradient[0] = 2 * M_PI / p[1];
         gradient[1] = -2 * M_PI * p[0] / (p[1] * p[1]);
-        if (stride == 3)
+        if (has_depth(row, j))
             gradient[2] = 0;
-        gradient += stride;
+        gradient += row->stride;
     }
     return sum;
 }
 
 static double sources_disc(const alb_form_row *row, const double *p, double rho_mm)
 {
-    const int stride = stride_of(row);
     double sum = 0;
-    for (int j = 0; j < row->term_count; j++, p += stride) {
-        const double z = stride == 3 ? p[2] : 0;
+    for (int j = 0; j < row->term_count; j++, p += row->stride) {
+        const double z = has_depth(row, j) ? p[2] : 0;
         const double further = rho_mm > 0 ? rho_mm * rho_mm / (sqrt(rho_mm * rho_mm + z * z) + z) : 0;
         sum += -p[0] * expm1(-p[1] * further) / p[1];
     }
@@ -66,18 +66,17 @@ static double sources_disc(const alb_form_row *row, const double *p, double rho_
 
 static double sources_slowest(const alb_form_row *row, const double *p)
 {
-    (void)row;
-    return p[1];
+    return row->term_count == 2 ? fmin(p[1], p[1 + row->stride]) : p[1];
 }
 
 static bool sources_sound(const alb_form_row *row, const double *p)
 {
-    const int stride = stride_of(row);
+    const bool alike = has_depth(row, 0) == has_depth(row, row->term_count - 1); // then in order
     double before = 0;
-    for (int j = 0; j < row->term_count; j++, p += stride) {
-        if (!(p[0] > 0 && p[1] > before && (stride == 2 || p[2] > 0)))
+    for (int j = 0; j < row->term_count; j++, p += row->stride) {
+        if (!(p[0] > 0 && p[1] > before && (!has_depth(row, j) || p[2] > 0)))
             return false;
-        before = p[1];
+        before = alike ? p[1] : 0;
     }
     return true;
 }
@@ -128,20 +127,30 @@ static bool burley_sound(const alb_form_row *row, const double *p)
 const alb_form_row alb_two_over_r_row = {.name = "two_exponentials_over_r",
                                          .parameter_count = 4,
                                          .term_count = 2,
+                                         .stride = 2,
                                          .singular = true,
                                          .parameters = {SOURCE(1), SOURCE(2)},
                                          SOURCES};
 const alb_form_row alb_buried_source_row = {.name = "buried_source",
                                             .parameter_count = 3,
                                             .term_count = 1,
+                                            .stride = 3,
                                             .parameters = {SOURCE(1), {"depth_1_mm", 0, 1}},
                                             SOURCES};
 const alb_form_row alb_two_buried_sources_row = {
     .name = "two_buried_sources",
     .parameter_count = 6,
     .term_count = 2,
+    .stride = 3,
     .parameters = {SOURCE(1), {"depth_1_mm", 0, 1}, SOURCE(2), {"depth_2_mm", 0, 1}},
     SOURCES};
+const alb_form_row alb_buried_and_over_r_row = {.name = "buried_source_and_over_r",
+                                                .parameter_count = 5,
+                                                .term_count = 2,
+                                                .stride = 3,
+                                                .singular = true,
+                                                .parameters = {SOURCE(1), {"depth_1_mm", 0, 1}, SOURCE(2)},
+                                                SOURCES};
 const alb_form_row alb_burley_row = {.name = "burley",
                                      .parameter_count = 2,
                                      .singular = true,

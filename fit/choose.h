@@ -3,13 +3,17 @@
 #include "fit/operator.h"
 #include "fit/uncertainty.h"
 
-enum { ALB_ATTEMPTS_MAX = 5, ALB_REASON_SIZE = 320 };
+enum { ALB_ATTEMPTS_MAX = 10, ALB_REASON_SIZE = 320 };
 
 typedef struct alb_attempt {
     alb_form form;
     bool tied;              // decay_2 held at 1.1 decay_1 (search.h)
-    double chi_square, bic; // by the noise alone; NaN where the form was not fitted
+    double chi_square, bic; // by the noise alone, as all of these; NaN where the form was not fitted
     int degrees_of_freedom;
+    double p_value;        // P(chi-square) at least as large
+    double lag_1, lag_1_p; // correlation of neighbouring whitened residuals, and P of one as large in white noise
+    int at_bound;          // parameter that lies on a bound of the search; -1: none
+    double bic_excess;     // over that of the form chosen; negative where a smaller one was given up
     char rejected[ALB_REASON_SIZE]; // empty: the one that was chosen
 } alb_attempt;
 
@@ -17,12 +21,14 @@ typedef struct alb_outcome {
     alb_fitted fitted;
     bool tied; // three free parameters: the covariance is of rank 3
     alb_attempt attempts[ALB_ATTEMPTS_MAX];
-    int attempt_count;           // three exponentials are tried only where nothing simpler stands
+    int attempt_count;           // others than one and two exponentials are tried only where these do not stand
     double discrepancy_relative; // 0: the form fits within the noise
     double rms_relative;         // (measured - fitted) / fitted over the readings above 3 sd
     double measured_share;       // share of the total within the readings
     double slope_per_mm, slope_sd, slope_from_mm, slope_to_mm; // d ln S / dr over the outer half of the readings
     alb_knowledge knowledge;
+    double free_total;  // before the energy was held (energy.h)
+    double energy_rise; // of chi-square, to hold it; of all sides of the channel
     char undecided[ALB_REASON_SIZE]; // why the data do not decide; empty where they do (fitted.identifiable)
 } alb_outcome;
 

@@ -75,7 +75,7 @@ static bool settle(alb_discrepancy_fit *out, double *sd, alb_candidate candidate
     return true;
 }
 
-bool alb_discrepancy_search(alb_discrepancy_fit *fit, double *sd, alb_candidate candidate, const alb_basis *basis,
+bool alb_discrepancy_search(alb_discrepancy_fit *fit, double *sd, alb_candidate candidate, alb_bases *bases,
                             const alb_weighing *noise, double energy_sd, alb_error *error)
 {
     const alb_readings *readings = noise->readings;
@@ -85,7 +85,7 @@ bool alb_discrepancy_search(alb_discrepancy_fit *fit, double *sd, alb_candidate 
     int which;
     *fit = (alb_discrepancy_fit){.found = false};
     widen(sd, readings, readings->value, first_discrepancy);
-    if (!alb_search(&fit->profile, &chi_square, &fit->found, candidate, basis, &widened, error))
+    if (!alb_form_search(&fit->profile, &chi_square, &fit->found, candidate, bases, &widened, error))
         return false;
     if (!fit->found)
         return true;

@@ -1,6 +1,6 @@
 // Fits where no form stands against the noise: the form is an approximation, and says by how much.
 #pragma once
-#include "fit/search.h"
+#include "fit/form_search.h"
 
 typedef struct alb_discrepancy_fit {
     alb_profile profile;
@@ -12,7 +12,7 @@ typedef struct alb_discrepancy_fit {
 
 // Fits one form with its discrepancy and with the energy as a reading of its own; `sd` has room for the readings and
 // holds the widened ones at the end.
-bool alb_discrepancy_search(alb_discrepancy_fit *fit, double *sd, alb_candidate candidate, const alb_basis *basis,
+bool alb_discrepancy_search(alb_discrepancy_fit *fit, double *sd, alb_candidate candidate, alb_bases *bases,
                             const alb_weighing *noise, double energy_sd, alb_error *error);
 // The sd of the readings with those of the form's discrepancy in quadrature.
 bool alb_discrepancy_widen(double *sd, const alb_discrepancy_fit *fit, const alb_weighing *noise, alb_error *error);

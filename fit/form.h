@@ -6,8 +6,9 @@ typedef struct alb_form_row alb_form_row;
 // All take the row and the form's own parameters p. `gradient` may be NULL.
 struct alb_form_row {
     const char *name;
-    int parameter_count, term_count; // of each term as many parameters
-    bool singular;                   // S grows as 1/r towards r = 0
+    int parameter_count, term_count;
+    int stride;    // parameters of a term; the last may have fewer
+    bool singular; // S grows as 1/r towards r = 0
     alb_parameter parameters[ALB_PARAMETERS_MAX];
     double (*value)(double *gradient, const alb_form_row *row, const double *p, double r_mm);
     double (*total)(double *gradient, const alb_form_row *row, const double *p);
@@ -17,4 +18,4 @@ struct alb_form_row {
 };
 
 extern const alb_form_row alb_dipole_row, alb_better_dipole_row, alb_burley_row, alb_two_over_r_row,
-    alb_buried_source_row, alb_two_buried_sources_row;
+    alb_buried_source_row, alb_two_buried_sources_row, alb_buried_and_over_r_row;

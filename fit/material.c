@@ -1,11 +1,18 @@
 // material.json: written by fit, read strictly by render.
 #include "base/record.h"
-#include "fit/measurement.h"
+#include "fit/energy.h"
 #include "fit/profile.h"
 #include "fit/search.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+
+static void find_properties(alb_fitting *fitting)
+{
+    for (int i = 0; i < ALB_SIDES * 3; i++)
+        fitting->basis.common_sd[i / 3][i % 3] = fitting->sides[i / 3][i % 3].common.flux;
+    alb_properties_find(fitting->properties, &fitting->material, &fitting->basis);
+}
 
 bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
 {
@@ -17,13 +24,18 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
             continue;
         measurement->measured = alb_choose(&measurement->outcome, &measurement->readings, &measurement->forward,
                                            measurement->common, &reasons[i]);
-        if (measurement->measured)
-            fitting->material.fitted[i / 3][i % 3] = measurement->outcome.fitted;
     }
     for (int i = 0; i < ALB_SIDES * 3; i++)
         if (reasons[i].status != ALB_OK)
             return alb_fail(error, reasons[i].status, "%s %s: %s", alb_side_names[i / 3],
                             fitting->material.channel_names[i % 3], reasons[i].text);
+    for (int c = 0; c < fitting->material.channels; c++)
+        if (!alb_energy_hold(fitting, c, error))
+            return false;
+    for (int i = 0; i < ALB_SIDES * 3; i++)
+        if (fitting->sides[i / 3][i % 3].measured)
+            fitting->material.fitted[i / 3][i % 3] = fitting->sides[i / 3][i % 3].outcome.fitted;
+    find_properties(fitting);
     return true;
 }
 
@@ -48,7 +60,13 @@ static void put_attempts(alb_json *json, const alb_outcome *outcome)
             alb_json_number(json, "decay_ratio_held", ALB_TIED_RATIO);
         alb_json_number(json, "chi_square", attempt->chi_square);
         alb_json_integer(json, "degrees_of_freedom", attempt->degrees_of_freedom);
+        alb_json_number(json, "p_value", attempt->p_value);
         alb_json_number(json, "bic", attempt->bic);
+        alb_json_number(json, "bic_excess", attempt->bic_excess);
+        alb_json_number(json, "residual_lag_1", attempt->lag_1);
+        alb_json_number(json, "residual_lag_1_p_value", attempt->lag_1_p);
+        if (attempt->at_bound >= 0)
+            alb_json_string(json, "at_bound", alb_form_parameter_name(attempt->form, attempt->at_bound));
         alb_json_string(json, "rejected", attempt->rejected);
         alb_json_end_object(json);
     }
@@ -96,6 +114,12 @@ static void put_outcome(alb_json *json, const char *side, const alb_outcome *out
     alb_json_end_list(json);
     alb_json_number(json, "condition", outcome->knowledge.condition);
     put_known(json, "total", fitted->total, fitted->total_sd, &outcome->knowledge.total, false);
+    if (fitted->total < outcome->free_total) {
+        alb_json_object(json, "energy_held");
+        alb_json_number(json, "free_total", outcome->free_total);
+        alb_json_number(json, "chi_square_rise", outcome->energy_rise);
+        alb_json_end_object(json);
+    }
     alb_json_number(json, "chi_square", fitted->chi_square);
     alb_json_integer(json, "degrees_of_freedom", fitted->degrees_of_freedom);
     alb_json_string(json, "errors_from",
@@ -130,6 +154,7 @@ void alb_material_put(alb_json *json, const alb_fitting *fitting)
         for (int side = 0; side < ALB_SIDES; side++)
             if (fitting->sides[side][c].measured)
                 put_outcome(json, alb_side_names[side], &fitting->sides[side][c].outcome);
+        alb_properties_put(json, &fitting->properties[c]);
         alb_json_end_object(json);
     }
     alb_json_end_object(json);
@@ -194,11 +219,12 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
     const char *form;
     long freedom;
     alb_node total;
-    if (!alb_node_allow(node,
-                        "form decay_ratio_held identifiable best_guess undecided parameters covariance condition total "
-                        "chi_square degrees_of_freedom "
-                        "errors_from discrepancy_relative rms_relative measured_share_of_total tail_slope_per_mm tried",
-                        error) ||
+    if (!alb_node_allow(
+            node,
+            "form decay_ratio_held identifiable best_guess undecided parameters covariance condition total energy_held "
+            "chi_square degrees_of_freedom "
+            "errors_from discrepancy_relative rms_relative measured_share_of_total tail_slope_per_mm tried",
+            error) ||
         !alb_node_text(&form, node, "form", error))
         return false;
     if (!alb_form_from_name(&fitted->profile.form, form))
@@ -245,7 +271,8 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
             return alb_node_fail(error, channels, key, "name longer than 7 characters");
         snprintf(material->channel_names[c], sizeof material->channel_names[0], "%s", key);
         if (!alb_node_object(&channel, channels, key, error) ||
-            !alb_node_allow(channel, "reflection transmission", error))
+            !alb_node_allow(channel, "reflection transmission optical_properties", error) ||
+            !alb_properties_check(channel, error))
             return false;
         for (int side = 0; side < ALB_SIDES; side++)
             if (alb_node_has(channel, alb_side_names[side]) &&

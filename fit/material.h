@@ -16,6 +16,7 @@ typedef enum alb_form {
     ALB_FORM_TWO_OVER_R,          // (a1 e^(-b1 r) + a2 e^(-b2 r)) / r, a > 0, b1 < b2
     ALB_FORM_BURLEY,              // A (e^(-r/d) + e^(-r/(3 d))) / (8 pi d r) (Christensen & Burley 2015)
     ALB_FORM_BURIED_SOURCE,       // a e^(-b (rho - z)) / rho, rho^2 = r^2 + z^2, all > 0: flat at r = 0
+    ALB_FORM_BURIED_AND_OVER_R,   // one buried source and a2 e^(-b2 r) / r
     ALB_FORM_TWO_BURIED_SOURCES,  // two of them, b1 < b2
     ALB_FORM_BETTER_DIPOLE,       // of a half-space (d'Eon 2012), as diffusion.h
     ALB_FORMS

@@ -2,6 +2,7 @@
 #pragma once
 #include "base/json.h"
 #include "fit/choose.h"
+#include "fit/properties.h"
 
 typedef struct alb_measurement {
     bool measured;
@@ -14,7 +15,10 @@ typedef struct alb_measurement {
 typedef struct alb_fitting {
     alb_material
         material; // name, thickness_mm, refractive_index, channels and their names; fitted is filled by alb_fitting_run
+    bool absolute; // values are in units of the incident flux
     alb_measurement sides[ALB_SIDES][3];
+    alb_properties_basis basis;   // common_sd is filled by alb_fitting_run
+    alb_properties properties[3]; // filled by alb_fitting_run
 } alb_fitting;
 
 // Fits every side and channel whose readings and forward model are there.

@@ -130,6 +130,40 @@ bool alb_operator_identity(alb_operator *forward, const alb_readings *readings, 
     return true;
 }
 
+bool alb_operator_coarsen(alb_operator *coarse, const alb_operator *forward, int factor, alb_error *error)
+{
+    const int f = forward->grid_count > 64 * factor && (forward->grid_count - 1) % factor == 0 ? factor : 1;
+    if (!allocate(coarse, forward->row_count, (forward->grid_count - 1) / f + 1, error))
+        goto failed;
+    for (int i = 0; i < forward->row_count; i++) {
+        coarse->first[i] = forward->first[i] / f;
+        coarse->last[i] = (forward->last[i] + f - 1) / f;
+        coarse->offset[i + 1] = coarse->offset[i] + (size_t)(coarse->last[i] - coarse->first[i] + 1);
+    }
+    if (!(coarse->weight = alb_allocate(coarse->offset[forward->row_count], sizeof(double), error)))
+        goto failed;
+    for (int k = 0; k < coarse->grid_count; k++)
+        coarse->grid_mm[k] = forward->grid_mm[k * f];
+    if (f > 1) // as the fine grid's: a quarter of the first spacing
+        coarse->grid_mm[0] = coarse->grid_mm[1] / 4;
+    for (int i = 0; i < forward->row_count; i++) {
+        double *out = coarse->weight + coarse->offset[i];
+        for (int k = forward->first[i]; k <= forward->last[i]; k++) {
+            const int low = k / f, place = low - coarse->first[i];
+            const double weight = forward->weight[forward->offset[i] + (size_t)(k - forward->first[i])];
+            const double from = low ? forward->grid_mm[low * f] : 0, at = k ? forward->grid_mm[k] : 0;
+            const double upper = k % f ? (at - from) / (forward->grid_mm[(low + 1) * f] - from) : 0;
+            out[place] += weight * (1 - upper);
+            if (upper > 0)
+                out[place + 1] += weight * upper;
+        }
+    }
+    return true;
+failed:
+    alb_operator_free(coarse);
+    return false;
+}
+
 void alb_operator_free(alb_operator *forward)
 {
     free(forward->grid_mm);

@@ -14,6 +14,9 @@ typedef struct alb_operator {
 bool alb_operator_create(alb_operator *forward, const alb_readings *readings, const alb_spot *spot, alb_error *error);
 // Readings that are values of S at their distances.
 bool alb_operator_identity(alb_operator *forward, const alb_readings *readings, alb_error *error);
+// The same on every `factor`-th grid point, the weights of the others split between their neighbours; a copy where the
+// grid is too small for that (readings at their distances).
+bool alb_operator_coarsen(alb_operator *coarse, const alb_operator *forward, int factor, alb_error *error);
 void alb_operator_free(alb_operator *forward);
 // out[row][c] = sum_k weight on_grid[k][c], four columns at once.
 enum { ALB_OPERATOR_COLUMNS = 4 };

@@ -76,7 +76,8 @@ static bool signed_sound(const alb_form_row *row, const double *p)
 #define EXPONENTIAL(n)                                                                                                 \
     {"amplitude_" #n "_per_mm2", 1, -2}, { "decay_" #n "_per_mm", 0, -1 }
 #define EXPONENTIALS                                                                                                   \
-    .value = exponentials_value, .total = exponentials_total, .disc = exponentials_disc, .slowest = exponentials_slowest
+    .stride = 2, .value = exponentials_value, .total = exponentials_total, .disc = exponentials_disc,                  \
+    .slowest = exponentials_slowest
 
 static const alb_form_row none = {.name = "none"};
 static const alb_form_row exponential = {.name = "exponential",
@@ -115,12 +116,17 @@ static const alb_form_row *const rows[ALB_FORMS] = {
     [ALB_FORM_TWO_OVER_R] = &alb_two_over_r_row,
     [ALB_FORM_BURLEY] = &alb_burley_row,
     [ALB_FORM_BURIED_SOURCE] = &alb_buried_source_row,
+    [ALB_FORM_BURIED_AND_OVER_R] = &alb_buried_and_over_r_row,
     [ALB_FORM_TWO_BURIED_SOURCES] = &alb_two_buried_sources_row,
 };
 
 int alb_form_parameter_count(alb_form form) { return rows[form]->parameter_count; }
 int alb_form_term_count(alb_form form) { return rows[form]->value == exponentials_value ? rows[form]->term_count : 0; }
 bool alb_form_singular(alb_form form) { return rows[form]->singular; }
+bool alb_form_ordered(alb_form form) // where the terms are alike
+{
+    return rows[form]->term_count * rows[form]->stride == rows[form]->parameter_count;
+}
 const char *alb_form_name(alb_form form) { return rows[form]->name; }
 const alb_parameter *alb_form_parameter(alb_form form, int i) { return &rows[form]->parameters[i]; }
 const char *alb_form_parameter_name(alb_form form, int i) { return rows[form]->parameters[i].name; }
@@ -191,9 +197,9 @@ bool alb_profile_sound(const alb_profile *profile)
 void alb_profile_order(alb_profile *profile)
 {
     const alb_form_row *row = rows[profile->form];
-    if (row->term_count < 2 || row->sound == signed_sound) // the signed pair is in order by its bounds
+    if (row->sound == signed_sound || !alb_form_ordered(profile->form)) // the signed pair is in order by its bounds
         return;
-    const int stride = row->parameter_count / row->term_count;
+    const int stride = row->stride;
     for (int i = 1; i < row->term_count; i++)
         for (double *p = profile->parameters + i * stride; p > profile->parameters && p[1] < p[1 - stride]; p -= stride)
             for (int k = 0; k < stride; k++) {

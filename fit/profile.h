@@ -14,6 +14,9 @@ int alb_form_term_count(alb_form form);
 // Whether S grows as 1/r towards r = 0.
 bool alb_form_singular(alb_form form);
 
+// Whether the decays rise from term to term.
+bool alb_form_ordered(alb_form form);
+
 // S(r) and its derivatives by the parameters. r > 0 for singular forms.
 double alb_profile_gradient(double gradient[ALB_PARAMETERS_MAX], const alb_profile *profile, double r_mm);
 // The same of the total 2 pi integral S r dr.

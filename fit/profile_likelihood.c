@@ -23,7 +23,7 @@
 
 enum { FREE = ALB_PARAMETERS_MAX + 1, MATRIX = FREE * FREE };
 static const double constraint_sd = 1e-5, furthest = 25; // e^25 times the fit
-static const double bound_rise = 5.412;                  // 98 % for one degree of freedom
+static const double bound_rise = 6.635;                  // 99 % for one degree of freedom
 
 typedef struct hold {
     alb_quantity quantity;
@@ -238,17 +238,22 @@ static void add_constraint(alb_likelihood *l, int plus, int minus, double scale,
     l->constraints[c].open = open;
 }
 
-// Order of the decays, S >= 0, and decays that the readings can show at all.
+// Order of the decays, S >= 0, and decays and depths that the readings can show at all.
 static void set_constraints(alb_likelihood *l)
 {
     const double outer = l->model.weighing->readings->outer_mm;
     const bool is_signed = l->candidate.form == ALB_FORM_SIGNED_EXPONENTIALS;
-    const int parameters = alb_candidate_parameters(l->candidate);
-    for (int p = 1; p < parameters; p += 2) {
-        add_constraint(l, p, -1, 1, log(0.01 / outer), true);
-        add_constraint(l, p, -1, -1, log(1e7 / outer), true);
-        if (p > 1)
-            add_constraint(l, p, p - 2, 1, is_signed ? log(ALB_TIED_RATIO) : 0, false);
+    int before = -1; // decay of the term before
+    for (int p = 0; p < alb_candidate_parameters(l->candidate); p++) {
+        const alb_parameter *parameter = alb_form_parameter(l->candidate.form, p);
+        if (parameter->flux || !parameter->length)
+            continue;
+        const bool decay = parameter->length < 0;
+        add_constraint(l, p, -1, 1, log(decay ? 0.01 / outer : 1e-5 * outer), true);
+        add_constraint(l, p, -1, -1, log(decay ? 1e7 / outer : 10 * outer), true);
+        if (decay && before >= 0 && alb_form_ordered(l->candidate.form))
+            add_constraint(l, p, before, 1, is_signed ? log(ALB_TIED_RATIO) : 0, false);
+        before = decay ? p : before;
     }
     if (is_signed)
         add_constraint(l, 0, 2, 1, 0, false);
@@ -443,14 +448,21 @@ alb_interval alb_likelihood_interval(alb_likelihood *l, alb_quantity quantity, d
                     : interval;
 }
 
+// Steps of at most 1 towards the value, then the value put right by what the reading that holds it misses it by.
 double alb_likelihood_hold(alb_profile *profile, alb_likelihood *l, alb_quantity quantity, double value)
 {
     point at = best_point(l, quantity);
-    const double target = log(fabs(value)), distance = target - at.held;
+    double direction[FREE], curvature, missed = 0;
+    const double target = log(fabs(value)), from = at.held, distance = target - from;
+    const double width = direction_of(direction, &curvature, &at, l, quantity) ? 1 / sqrt(curvature) : 1;
+    const double sd = 0.03 * fmin(width, 1);
     const int steps = (int)fmin(ceil(fabs(distance)), 100);
-    const double from = at.held;
     for (int s = 1; s <= steps; s++)
-        at = point_near(&at, l, quantity, from + distance * s / steps, 1e-6);
+        at = point_near(&at, l, quantity, from + distance * s / steps, sd);
+    for (int again = 0; again < 20 && fabs(target - at.held) > 1e-9; again++) {
+        missed += target - at.held;
+        at = point_near(&at, l, quantity, target + missed, sd);
+    }
     *profile = profile_at(l, at.u);
     return at.chi_square;
 }

@@ -44,8 +44,8 @@ bool alb_likelihood_create(alb_likelihood *likelihood, const alb_profile *start,
 void alb_likelihood_free(alb_likelihood *likelihood);
 
 // Where chi-square, least over all else, has risen by `rise` (3.841: 95 %). Where `worst` is not NULL: raises worst[p]
-// to the largest Cramer-Rao bound of parameter p, relative to it, at the two ends that the data allow with 98 % (rise
-// 5.412); INFINITY where they set no limit there.
+// to the largest Cramer-Rao bound of parameter p, relative to it, at the two ends that the data allow with 99 % (rise
+// 6.635); INFINITY where they set no limit there.
 alb_interval alb_likelihood_interval(alb_likelihood *likelihood, alb_quantity quantity, double rise, double *worst);
 // The best profile with the quantity held at `value`, from the best fit; returns its chi-square.
 double alb_likelihood_hold(alb_profile *profile, alb_likelihood *likelihood, alb_quantity quantity, double value);

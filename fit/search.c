@@ -125,6 +125,17 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate c
     return ok;
 }
 
+int alb_search_at_bound(const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing)
+{
+    double u[PARAMETERS], lower[PARAMETERS], upper[PARAMETERS];
+    solver_of(u, profile);
+    bounds_of(lower, upper, candidate.form, weighing);
+    for (int p = 0; p < alb_candidate_parameters(candidate); p++)
+        if (fmin(u[p] - lower[p], upper[p] - u[p]) < 1e-6 * (upper[p] - lower[p]))
+            return p;
+    return -1;
+}
+
 // Readings under a finite spot see interpolated columns in the search, so that its result is polished by the exact
 // ones.
 bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_candidate candidate, const alb_basis *basis,

@@ -21,6 +21,9 @@ bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_candi
 // From the profile given to the nearest minimum.
 bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate candidate, const alb_weighing *weighing,
                        alb_error *error);
+// The first parameter that lies on a bound of the search (an amplitude that vanishes, a decay or depth that the
+// readings cannot show, decays as close as is allowed), -1 for none.
+int alb_search_at_bound(const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing);
 // Inverse of the normal matrix J^T J, both in the form's own parameters; false (and zeros) where a column of J is
 // linear in those before it but for 1e-11 (1 - R^2).
 bool alb_candidate_covariance(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX],

@@ -213,9 +213,12 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, 
     bool ok = calibration && alb_path_join(path, folder, "calibration.json", error) &&
               alb_calibration_read(calibration, folder, error) && alb_provenance_add(provenance, path, error);
     if (ok) {
+        fitting->absolute = true;
         memcpy(material->name, calibration->sample, sizeof material->name);
         material->thickness_mm = calibration->thickness_mm;
         material->refractive_index = calibration->refractive_index;
+        fitting->basis.finish = calibration->finish;
+        fitting->basis.own_sd = calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0;
         material->channels = calibration->channels;
         memcpy(material->channel_names, calibration->channel_names, sizeof material->channel_names);
         ok = observe_products(fitting, provenance, notes, calibration, error) && alb_fitting_run(fitting, error);

@@ -10,9 +10,9 @@
 // A parameter is identifiable where its Cramer-Rao bound is at most half of itself. The bound is a function of the
 // unknown truth, so its value at the fit will not do: near the threshold the fit is as often on the one side as on the
 // other, and those on the good side are the ones where the noise made the term look better than it is. Asked is that
-// the bound holds for every profile that the data allow, and looked at are the ends of the 98 % intervals of all
+// the bound holds for every profile that the data allow, and looked at are the ends of the 99 % intervals of all
 // parameters. So a term whose true bound is above half is called identifiable in at most 1 % of measurements, and one
-// has to have a bound of about 0.2 at the fit (0.5 / (1 + 2.33 / 2)). What is stated is then right in this sense: a
+// has to have a bound of about 0.2 at the fit (0.5 / (1 + 2.58 / 2)). What is stated is then right in this sense: a
 // measurement that says "identifiable" and whose 95 % interval misses happens in at most 5 % of all measurements of a
 // sample. Where a sample is called identifiable only now and then, those few have the term larger than it is.
 //
@@ -271,38 +271,30 @@ static void add_common(alb_fitted *fitted, int n, alb_common_sd common)
         }
 }
 
-bool alb_outcome_complete(alb_outcome *outcome, alb_candidate candidate, const alb_weighing *weighing, double energy_sd,
-                          alb_common_sd common, alb_error *error)
+double alb_energy_sd(const alb_readings *readings)
 {
-    const alb_readings *readings = weighing->readings;
+    double variance = 0;
+    for (int i = 0; i < readings->count; i++)
+        variance += pow(readings->area_mm2[i] * readings->sd[i], 2);
+    return hypot(sqrt(variance), 1e-4 * fabs(alb_energy(readings, readings->value)));
+}
+
+// Of the total, what lies beyond the readings and inside the first.
+static void find_unmeasured(double *beyond, double *core, const alb_fitted *fitted, const alb_readings *readings)
+{
+    *beyond = fitted->total - 2 * M_PI * alb_profile_disc(&fitted->profile, readings->outer_mm);
+    *core = 2 * M_PI * alb_profile_disc(&fitted->profile, readings->core_mm);
+}
+
+bool alb_outcome_describe_fit(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward,
+                              alb_error *error)
+{
     alb_fitted *fitted = &outcome->fitted;
-    const alb_profile *profile = &fitted->profile;
-    const int n = alb_form_parameter_count(profile->form);
-    bool full_rank;
-    double gradient[ALB_PARAMETERS_MAX];
-    if (!alb_search_covariance(fitted->covariance, &full_rank, profile, candidate, weighing, error))
-        return false;
-    fitted->total = alb_profile_total_gradient(gradient, profile);
-    const double beyond = fitted->total - 2 * M_PI * alb_profile_disc(profile, readings->outer_mm);
-    const double core = 2 * M_PI * alb_profile_disc(profile, readings->core_mm);
-    double variance = quadratic_form(gradient, fitted, n), extra = 0;
-    if (outcome->discrepancy_relative > 0) {
-        extra = 0.25 * (beyond * beyond + core * core);
-        variance = fmax(variance, energy_sd * energy_sd) + extra;
-    }
-    if (!alb_knowledge_find(&outcome->knowledge, profile, candidate, weighing, error))
-        return false;
-    widen_intervals(outcome, n, common, sqrt(extra));
-    outcome->measured_share = 1 - (beyond + core) / fitted->total;
-    add_common(fitted, n, common);
-    fitted->total_sd = sqrt(variance + fitted->total * fitted->total * common.flux * common.flux);
-    for (int p = 0; p < n; p++)
-        fitted->sd[p] = sqrt(fitted->covariance[p][p]);
-    double *model = alb_operator_readings(weighing->forward, profile, error);
+    double *model = alb_operator_readings(forward, &fitted->profile, error), squares = 0, beyond, core;
+    int counted = 0;
     if (!model)
         return false;
-    double squares = 0;
-    int counted = 0;
+    fitted->chi_square = 0;
     for (int i = 0; i < readings->count; i++) {
         const double residual = readings->value[i] - model[i], whitened = residual / readings->sd[i];
         fitted->chi_square += whitened * whitened;
@@ -312,9 +304,42 @@ bool alb_outcome_complete(alb_outcome *outcome, alb_candidate candidate, const a
         }
     }
     free(model);
-    fitted->degrees_of_freedom = readings->count - alb_candidate_parameters(candidate);
     outcome->rms_relative = counted ? sqrt(squares / counted) : 0;
+    find_unmeasured(&beyond, &core, fitted, readings);
+    outcome->measured_share = 1 - (beyond + core) / fitted->total;
     describe_tail(outcome, readings);
+    return true;
+}
+
+bool alb_outcome_complete(alb_outcome *outcome, alb_candidate candidate, const alb_weighing *weighing, double energy_sd,
+                          alb_common_sd common, alb_error *error)
+{
+    const alb_readings *readings = weighing->readings;
+    alb_fitted *fitted = &outcome->fitted;
+    const alb_profile *profile = &fitted->profile;
+    const int n = alb_form_parameter_count(profile->form);
+    bool full_rank;
+    double gradient[ALB_PARAMETERS_MAX], beyond, core;
+    if (!alb_search_covariance(fitted->covariance, &full_rank, profile, candidate, weighing, error))
+        return false;
+    fitted->total = alb_profile_total_gradient(gradient, profile);
+    outcome->free_total = fitted->total;
+    double variance = quadratic_form(gradient, fitted, n), extra = 0;
+    if (outcome->discrepancy_relative > 0) {
+        find_unmeasured(&beyond, &core, fitted, readings);
+        extra = 0.25 * (beyond * beyond + core * core);
+        variance = fmax(variance, energy_sd * energy_sd) + extra;
+    }
+    if (!alb_knowledge_find(&outcome->knowledge, profile, candidate, weighing, error))
+        return false;
+    widen_intervals(outcome, n, common, sqrt(extra));
+    add_common(fitted, n, common);
+    fitted->total_sd = sqrt(variance + fitted->total * fitted->total * common.flux * common.flux);
+    for (int p = 0; p < n; p++)
+        fitted->sd[p] = sqrt(fitted->covariance[p][p]);
+    fitted->degrees_of_freedom = readings->count - alb_candidate_parameters(candidate);
+    if (!alb_outcome_describe_fit(outcome, readings, weighing->forward, error))
+        return false;
     judge(outcome, readings, full_rank);
     return true;
 }

@@ -12,7 +12,7 @@ enum { ALB_BECAUSE_SIZE = 200 };
 typedef struct alb_certainty {
     double lower, upper;   // 95 %, by the profile likelihood; an open end is 0 or infinite, with the quantity's sign
     double cramer_rao_sd;  // by the noise alone, at the fit; infinite where the rank is deficient
-    double worst_relative; // the same relative to the parameter, the largest that the data allow with 98 %
+    double worst_relative; // the same relative to the parameter, the largest that the data allow with 99 %
     char because[ALB_BECAUSE_SIZE]; // why it is not identifiable; empty where it is
 } alb_certainty;
 
@@ -22,7 +22,7 @@ typedef struct alb_knowledge {
 } alb_knowledge;
 
 // What the readings tell of each parameter. A parameter is identifiable where its Cramer-Rao bound is at most half of
-// itself not only at the fit, but at the ends of all the parameters' 98 % intervals too; see uncertainty.c.
+// itself not only at the fit, but at the ends of all the parameters' 99 % intervals too; see uncertainty.c.
 bool alb_knowledge_find(alb_knowledge *knowledge, const alb_profile *profile, alb_candidate candidate,
                         const alb_weighing *weighing, alb_error *error);
 // Whether all parameters are; the reason where one is not. Less work where the bound at the fit says no.
@@ -33,5 +33,11 @@ bool alb_identify(bool *identifiable, char because[ALB_BECAUSE_SIZE], const alb_
 // energy_sd the sd of the measured energy. Fails only for want of memory.
 bool alb_outcome_complete(struct alb_outcome *outcome, alb_candidate candidate, const alb_weighing *weighing,
                           double energy_sd, struct alb_common_sd common, alb_error *error);
+// What compares the outcome's profile with the readings: chi-square, rms, the share of the total that was measured, the
+// slope of the tail.
+bool alb_outcome_describe_fit(struct alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward,
+                              alb_error *error);
+// sd of alb_energy of the readings' values, no better than 1e-4.
+double alb_energy_sd(const alb_readings *readings);
 // sd of S(r), 1/mm^2, by the covariance; only for sums of exponentials.
 double alb_profile_sd(const alb_fitted *fitted, double r_mm);

@@ -2,6 +2,7 @@
 #include "base/random.h"
 #include "check.h"
 #include "fit/choose.h"
+#include "fit/profile.h"
 
 enum { READINGS = 120 };
 
@@ -13,8 +14,9 @@ static void make_above(alb_readings *readings, const alb_profile *truth, double 
     check_ok(alb_readings_create(readings, count, &error), &error);
     for (int i = 0; i < count; i++) {
         const double step = range_mm / count, r = step * (i + 0.5), value = alb_profile_value(truth, r);
+        const double top = alb_profile_value(truth, alb_form_singular(truth->form) ? step / 2 : 0);
         readings->r_mm[i] = r;
-        readings->sd[i] = noise * hypot(value, floor * alb_profile_value(truth, 0));
+        readings->sd[i] = noise * hypot(value, floor * top);
         readings->value[i] = value + readings->sd[i] * alb_random_normal(random);
         readings->area_mm2[i] = 2 * M_PI * r * step;
     }
@@ -91,7 +93,7 @@ static void a_third_term(void **state)
         alb_outcome outcome;
         make(&readings, &two, 12, noise, READINGS, &random);
         choose(&outcome, &readings, 0);
-        tried += outcome.attempt_count == ALB_ATTEMPTS_MAX;
+        tried += outcome.attempt_count > 4;
         used += outcome.fitted.profile.form == ALB_FORM_THREE_EXPONENTIALS;
         alb_readings_free(&readings);
     }
@@ -118,11 +120,12 @@ static void close_decays_stay_simple(void **state)
         choose(&outcome, &readings, 0);
         assert_true(outcome.fitted.identifiable);
         check_near(outcome.fitted.total, alb_profile_total(&close), 4.5 * outcome.fitted.total_sd);
-        if (outcome.attempt_count == ALB_ATTEMPTS_MAX &&
-            strstr(outcome.attempts[ALB_ATTEMPTS_MAX - 1].rejected, "fits within the noise, but")) {
-            assert_true(outcome.discrepancy_relative > 0 && outcome.discrepancy_relative < 0.01);
-            undecided++;
-        }
+        for (int i = 0; i < outcome.attempt_count; i++)
+            if (outcome.attempts[i].form == ALB_FORM_THREE_EXPONENTIALS &&
+                strstr(outcome.attempts[i].rejected, "fits within the noise, but")) {
+                assert_true(outcome.discrepancy_relative > 0 && outcome.discrepancy_relative < 0.01);
+                undecided++;
+            }
         alb_readings_free(&readings);
     }
     print_message("close decays: three not decided in %d of %d\n", undecided, TRIALS);
@@ -130,7 +133,7 @@ static void close_decays_stay_simple(void **state)
 }
 
 // The terms of a positive sum cannot follow a flat top, S = (1 + r + r^2 / 3) e^(-r), however many there are.
-static void flat_top_stays_signed(void **state)
+static void flat_top_wants_a_flat_form(void **state)
 {
     (void)state;
     for (unsigned t = 0; t < 10; t++) {
@@ -148,9 +151,47 @@ static void flat_top_stays_signed(void **state)
             readings.outer_mm = r;
         }
         choose(&outcome, &readings, 0);
-        assert_true(outcome.discrepancy_relative > 0 && outcome.attempt_count == ALB_ATTEMPTS_MAX);
-        assert_int_equal(outcome.fitted.profile.form, ALB_FORM_SIGNED_EXPONENTIALS);
+        assert_true(outcome.discrepancy_relative > 0);
+        const alb_form form = outcome.fitted.profile.form;
+        assert_true(form == ALB_FORM_SIGNED_EXPONENTIALS || form == ALB_FORM_BURIED_SOURCE ||
+                    form == ALB_FORM_TWO_BURIED_SOURCES);
         alb_readings_free(&readings);
+    }
+}
+
+// Data of every further form choose it; what was tried beside it says by how much it loses.
+static void every_form_where_it_is_true(void **state)
+{
+    (void)state;
+    static const alb_profile truths[] = {{ALB_FORM_BURLEY, {0.7, 0.8}},
+                                         {ALB_FORM_BURIED_SOURCE, {0.3, 0.5, 2}},
+                                         {ALB_FORM_TWO_OVER_R, {0.1, 0.4, 1, 2}},
+                                         {ALB_FORM_BURIED_AND_OVER_R, {0.1, 0.4, 1.5, 0.3, 2}},
+                                         {ALB_FORM_TWO_BURIED_SOURCES, {0.1, 0.4, 1.5, 1, 2, 0.3}}};
+    for (size_t i = 0; i < sizeof truths / sizeof truths[0]; i++) {
+        int wrong = 0;
+        for (unsigned t = 0; t < 20; t++) {
+            alb_random random = alb_random_at(10, (unsigned)i, t);
+            alb_readings readings = {0};
+            alb_outcome outcome;
+            make_above(&readings, &truths[i], 12, 0.003, 1e-6, READINGS, &random);
+            choose(&outcome, &readings, 0);
+            assert_true(outcome.fitted.identifiable && outcome.discrepancy_relative == 0);
+            check_near(outcome.fitted.total, alb_profile_total(&truths[i]), 4.5 * outcome.fitted.total_sd);
+            wrong += outcome.fitted.profile.form != truths[i].form;
+            for (int k = 0; outcome.fitted.profile.form == truths[i].form && k < outcome.attempt_count; k++) {
+                const alb_attempt *attempt = &outcome.attempts[k];
+                if (attempt->form == truths[i].form) {
+                    assert_true(attempt->p_value >= 1e-3 && attempt->bic_excess == 0 && attempt->at_bound < 0);
+                    assert_true(fabs(attempt->lag_1) < 5 / sqrt(READINGS)); // white
+                } else if (isfinite(attempt->chi_square)) {
+                    assert_true(attempt->p_value < 1e-3 || attempt->bic_excess > 0);
+                }
+            }
+            alb_readings_free(&readings);
+        }
+        // a form with two more parameters has the least BIC in 1 % of all data: three of 20 in one of 1000 tests
+        assert_true(wrong <= 2);
     }
 }
 
@@ -226,8 +267,8 @@ static void energy_is_kept_where_no_form_fits(void **state)
                       100 * outcome.rms_relative, outcome.fitted.total, outcome.fitted.total_sd,
                       alb_profile_total(&truth), 100 * (outcome.fitted.total / alb_profile_total(&truth) - 1));
         assert_true(outcome.discrepancy_relative > 0.001);
-        assert_int_equal(outcome.fitted.profile.form, ALB_FORM_THREE_EXPONENTIALS);
-        // three terms follow distances to 60 mean free paths to 5 %; two leave 5 to 35 %
+        // six parameters follow distances to 60 mean free paths to 5 %; two exponentials leave 5 to 35 %
+        assert_int_equal(alb_form_parameter_count(outcome.fitted.profile.form), 6);
         check_below(outcome.rms_relative, 5 / sigma * (materials[m][0] + materials[m][1]) < 60 ? 0.05 : 0.08);
         check_relative(outcome.fitted.total, alb_profile_total(&truth), 0.002);
         check_near(outcome.fitted.total, alb_profile_total(&truth), 4 * outcome.fitted.total_sd);
@@ -339,7 +380,8 @@ int main(void)
                                        cmocka_unit_test(as_much_as_needed),
                                        cmocka_unit_test(a_third_term),
                                        cmocka_unit_test(close_decays_stay_simple),
-                                       cmocka_unit_test(flat_top_stays_signed),
+                                       cmocka_unit_test(flat_top_wants_a_flat_form),
+                                       cmocka_unit_test(every_form_where_it_is_true),
                                        cmocka_unit_test(coinciding_decays),
                                        cmocka_unit_test(totals_are_honest),
                                        cmocka_unit_test(energy_is_kept_where_no_form_fits),

@@ -1,0 +1,34 @@
+// Optical properties of a fitted slab: per channel (sigma_a, sigma_s') from the totals of its two sides, with what they
+// rest on. Part of material.json ("optical_properties").
+#pragma once
+#include "base/json.h"
+#include "base/record.h"
+#include "fit/material.h"
+#include "fit/optical.h"
+
+typedef struct alb_properties {
+    bool known;          // false: not tried (refused empty), or refused
+    alb_optical optical; // with the anisotropy that was assumed
+    double anisotropy;
+    double other_anisotropy, other[2]; // sigma_a, sigma_s' of the same totals with another anisotropy: the price of not
+                                       // knowing it; NaN where no slab has them
+    char refused[320];
+} alb_properties;
+
+// What the totals do not say themselves.
+typedef struct alb_properties_basis {
+    alb_finish finish;              // of the faces
+    double anisotropy;              // g, assumed
+    double common_sd[ALB_SIDES][3]; // relative, common to all readings of a side and channel
+    double own_sd;                  // the part of it that the other side does not share
+} alb_properties_basis;
+
+// Of the material's slab: both sides fitted, thickness and index known.
+void alb_properties_find(alb_properties properties[3], const alb_material *material, const alb_properties_basis *basis);
+
+// Writes "optical_properties" into an open object; nothing where it was not tried.
+void alb_properties_put(alb_json *json, const alb_properties *properties);
+// Adds sentences for a reader: values, assumption, flags.
+void alb_properties_note(alb_text *notes, const char *channel, const alb_properties *properties);
+// Checks "optical_properties" of a record, where it is there.
+bool alb_properties_check(alb_node channel, alb_error *error);

@@ -1,0 +1,70 @@
+// The chain as a user runs it, on a slab in which photons were scattered: absorption and reduced scattering come back
+// from the photographs within what they say of themselves, and the diffusion of photons was never told to fit.
+#include "base/record.h"
+#include "chain.h"
+
+// 0.2 % of each total by its photons.
+static const char medium[] =
+    "\"medium\": {\"absorption_per_mm\": [0.01, 0.02, 0.04], \"scattering_per_mm\": [2, 2.2, 2.5],\n"
+    "  \"anisotropy\": [0.5, 0.5, 0.5], \"refractive_index\": 1.5, \"photons\": 200000}";
+
+static void replace(char *text, const char *from, const char *to)
+{
+    char *at = strstr(text, from);
+    assert_true(at && strlen(to) <= strlen(from));
+    memset(at, ' ', strlen(from));
+    memcpy(at, to, strlen(to));
+}
+
+static void estimate(double *value, double *sd, alb_node properties, const char *key)
+{
+    alb_error error = {0};
+    alb_node node;
+    check_ok(alb_node_object(&node, properties, key, &error) && alb_node_number(value, node, "value", 0, 1e9, &error) &&
+                 alb_node_number(sd, node, "sd", 0, 1e9, &error),
+             &error);
+}
+
+static void properties_of_a_photographed_slab(void **state)
+{
+    (void)state;
+    static const double truth[2][3] = {{0.01, 0.02, 0.04}, {2 * 0.5, 2.2 * 0.5, 2.5 * 0.5}}; // of medium
+    assert_int_equal(shell("rm -rf optical.tmp"), 0);
+    char plan[sizeof chain_plan];
+    memcpy(plan, chain_plan, sizeof plan);
+    replace(plan, "\"finish\": \"ground\"", "\"finish\": \"smooth\"");
+    save_text("optical_plan.tmp.json", plan);
+    save_chain_truth("optical_truth.tmp.json", medium, 10);
+    assert_int_equal(run("capture optical_plan.tmp.json -o optical.tmp --rig virtual:optical_truth.tmp.json"), 0);
+    assert_int_equal(run("calibrate optical.tmp"), 0);
+    assert_int_equal(run("fit optical.tmp --anisotropy 0.5"), 0);
+    alb_error error = {0};
+    alb_record *record = alb_record_read("optical.tmp/material.json", &error);
+    alb_node root, channels;
+    check_ok(record && alb_record_root(&root, record, &error) && alb_node_object(&channels, root, "channels", &error),
+             &error);
+    double chi_square = 0;
+    for (int c = 0; c < 3; c++) {
+        alb_node channel, properties;
+        check_ok(alb_node_object(&channel, channels, (const char *[]){"R", "G", "B"}[c], &error) &&
+                     alb_node_object(&properties, channel, "optical_properties", &error),
+                 &error);
+        for (int p = 0; p < 2; p++) {
+            double value, sd;
+            estimate(&value, &sd, properties, p ? "reduced_scattering_per_mm" : "absorption_per_mm");
+            print_message("%s %d: %.4g +- %.2g, truth %.4g\n", p ? "sigma_s'" : "sigma_a", c, value, sd, truth[p][c]);
+            chi_square += pow((value - truth[p][c]) / sd, 2);
+            check_below(sd, 0.15 * value);
+        }
+    }
+    check_below(chi_square, 6 + 4 * sqrt(2 * 6)); // 4 sd, six readings that share their errors
+    alb_record_free(record);
+    forget_runs();
+    assert_int_equal(shell("rm -rf optical.tmp optical_plan.tmp.json optical_truth.tmp.json"), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(properties_of_a_photographed_slab)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
