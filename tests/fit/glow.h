@@ -90,10 +90,10 @@ typedef struct glow_picture {
     double clean[GLOW_SIZE * GLOW_SIZE], value[GLOW_SIZE * GLOW_SIZE], variance[GLOW_SIZE * GLOW_SIZE];
 } glow_picture;
 
-// The spot's middle at (x, y) mm; every pixel averages 7 x 7 points of its square.
+// The spot's middle at (x, y) mm; every pixel averages 5 x 5 points of its square.
 static inline void glow_paint(glow_picture *out, const glow *light, double pitch_mm, double x_mm, double y_mm)
 {
-    enum { ACROSS = 7 };
+    enum { ACROSS = 5 };
     alb_error error = {0};
     alb_face_free(&out->face);
     check_ok(alb_face_flat(&out->face, GLOW_SIZE, GLOW_SIZE, pitch_mm, &error), &error);

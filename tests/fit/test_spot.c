@@ -23,76 +23,48 @@ static int tear_down(void **state)
     return 0;
 }
 
-// Fits the picture as lit by the spot.
-static void fit(alb_fitting *fitting, alb_side side, const alb_spot *spot)
-{
-    alb_error error = {0};
-    alb_measurement *one = &fitting->sides[side][0];
-    const alb_channel channel = glow_channel(picture);
-    fitting->material.channels = 1;
-    check_ok(alb_observe(&one->readings, &channel, &error), &error);
-    check_ok(alb_operator_create(&one->forward, &one->readings, spot, &error), &error);
-    check_ok(alb_fitting_run(fitting, &error), &error);
-}
-
-typedef struct bias {
-    double worst_reading, worst_curve, worst_ignored; // in bands of r, from `from_mm` on
-} bias;
-
-// Readings taken back to a pencil beam by the fitted form, reading * S(r) / (forward S), against the photons; beside
-// the form itself and the readings as they are. Means over bands, in which the noise of the photons averages out.
-static bias against_photons(const alb_fitting *fitting, alb_side side, double from_mm, double to_mm)
-{
-    enum { BANDS = 6 };
-    alb_error error = {0};
-    const alb_measurement *one = &fitting->sides[side][0];
-    const alb_profile *profile = &one->outcome.fitted.profile;
-    double *forward = alb_operator_readings(&one->forward, profile, &error);
-    double sums[BANDS][4] = {{0}};
-    bias out = {0};
-    assert_non_null(forward);
-    for (int i = 0; i < one->readings.count; i++) {
-        const double r = one->readings.r_mm[i], truth = glow_at(light->pencil, r), s = alb_profile_value(profile, r);
-        const int band = (int)floor(BANDS * log(r / from_mm) / log(to_mm / from_mm));
-        if (r < from_mm || r >= to_mm)
-            continue;
-        sums[band][0]++;
-        sums[band][1] += one->readings.value[i] * s / forward[i] / truth - 1;
-        sums[band][2] += s / truth - 1;
-        sums[band][3] += one->readings.value[i] / truth - 1;
-    }
-    for (int b = 0; b < BANDS; b++)
-        if (sums[b][0] > 0) {
-            out.worst_reading = fmax(out.worst_reading, fabs(sums[b][1] / sums[b][0]));
-            out.worst_curve = fmax(out.worst_curve, fabs(sums[b][2] / sums[b][0]));
-            out.worst_ignored = fmax(out.worst_ignored, fabs(sums[b][3] / sums[b][0]));
-        }
-    free(forward);
-    return out;
-}
-
-static bias one_spot(alb_side side, glow_spot kind, double pitch_mm, double from_mm, bool pixel)
+static void see(alb_readings *readings, alb_operator *forward, glow_spot kind, double pitch_mm, bool pixel)
 {
     alb_error error = {0};
     alb_spot spot = {0};
-    alb_fitting *fitting = calloc(1, sizeof *fitting);
-    glow_make(light, (int)side, kind);
-    glow_paint(picture, light, pitch_mm, pitch_mm * (GLOW_SIZE / 2 + 0.37), pitch_mm * (GLOW_SIZE / 2 - 0.21));
-    glow_expose(picture, 0.005, 1);
+    const alb_channel channel = glow_channel(picture);
     check_ok((kind.gaussian ? alb_spot_gaussian : alb_spot_disc)(&spot, kind.radius_mm, &error), &error);
     if (pixel)
         check_ok(alb_spot_see(&spot, pitch_mm, &error), &error);
-    fit(fitting, side, &spot);
-    const bias out = against_photons(fitting, side, from_mm, 6);
-    print_message("%s %-8s radius %.2f mm, pixel %.3f mm: %.2f %% off beyond %.2f mm (form %.2f %%, spot ignored %.1f "
-                  "%%); total %+.2f %%\n",
-                  alb_side_names[side], kind.gaussian ? "gaussian" : "disc", kind.radius_mm, pitch_mm,
-                  100 * out.worst_reading, from_mm, 100 * out.worst_curve, 100 * out.worst_ignored,
-                  100 * (fitting->sides[side][0].outcome.fitted.total / light->total - 1));
+    check_ok(alb_observe(readings, &channel, &error), &error);
+    check_ok(alb_operator_create(forward, readings, &spot, &error), &error);
     alb_spot_free(&spot);
-    alb_fitting_free(fitting);
-    free(fitting);
-    return out;
+}
+
+// The readings of a picture against what the forward model makes of the photons themselves, no form between: the worst
+// relative difference from `from_mm` to 6 mm. *ignored: the same against the photons' profile at the readings'
+// distances.
+static double convolution_bias(double *ignored, alb_side side, glow_spot kind, double pitch_mm, double from_mm,
+                               bool pixel)
+{
+    alb_readings readings = {0};
+    alb_operator forward = {0};
+    double worst = 0;
+    glow_make(light, (int)side, kind);
+    glow_paint(picture, light, pitch_mm, pitch_mm * (GLOW_SIZE / 2 + 0.37), pitch_mm * (GLOW_SIZE / 2 - 0.21));
+    glow_expose(picture, 0.001, 1);
+    see(&readings, &forward, kind, pitch_mm, pixel);
+    double(*on_grid)[ALB_OPERATOR_COLUMNS] = calloc((size_t)forward.grid_count, sizeof *on_grid);
+    double(*out)[ALB_OPERATOR_COLUMNS] = calloc((size_t)readings.count, sizeof *out);
+    for (int k = 0; k < forward.grid_count; k++)
+        on_grid[k][0] = alb_kernel_value(glow_kernel((int)side), forward.grid_mm[k]);
+    alb_operator_apply(out, &forward, (const double(*)[ALB_OPERATOR_COLUMNS])on_grid);
+    *ignored = 0;
+    for (int i = 0; i < readings.count; i++)
+        if (readings.r_mm[i] >= from_mm && readings.r_mm[i] < 6) {
+            worst = fmax(worst, fabs(readings.value[i] / out[i][0] - 1));
+            *ignored = fmax(*ignored, fabs(readings.value[i] / glow_at(light->pencil, readings.r_mm[i]) - 1));
+        }
+    free(on_grid);
+    free(out);
+    alb_operator_free(&forward);
+    alb_readings_free(&readings);
+    return worst;
 }
 
 static void wide_spot(void **state)
@@ -102,10 +74,49 @@ static void wide_spot(void **state)
     for (int side = 0; side < ALB_SIDES; side++)
         for (int gaussian = 0; gaussian < 2; gaussian++)
             for (int i = 0; i < 4; i++) {
-                const bias found =
-                    one_spot((alb_side)side, (glow_spot){gaussian, radii_mm[i]}, 0.08, radii_mm[i], true);
-                (void)found;
+                double ignored;
+                const double worst = convolution_bias(&ignored, (alb_side)side, (glow_spot){gaussian, radii_mm[i]},
+                                                      0.08, radii_mm[i], true);
+                print_message("%-12s %-8s radius %.2f mm: %.2f %% off beyond it; spot ignored: %.1f %%\n",
+                              alb_side_names[side], gaussian ? "gaussian" : "disc", radii_mm[i], 100 * worst,
+                              100 * ignored);
+                check_below(worst, 0.01);
             }
+}
+
+// The fitted profile itself, whose form adds its own error: totals, and the curve beyond the spot.
+static void fit_under_a_wide_spot(void **state)
+{
+    (void)state;
+    const glow_spot kind = {false, 1};
+    alb_fitting *fitting = calloc(1, sizeof *fitting);
+    double total[ALB_SIDES];
+    fitting->material.channels = 1;
+    for (int side = 0; side < ALB_SIDES; side++) {
+        glow_make(light, side, kind);
+        glow_paint(picture, light, 0.08, 8.03, 7.98);
+        glow_expose(picture, 0.005, 1);
+        see(&fitting->sides[side][0].readings, &fitting->sides[side][0].forward, kind, 0.08, true);
+        total[side] = light->total;
+    }
+    alb_error error = {0};
+    check_ok(alb_fitting_run(fitting, &error), &error);
+    for (int side = 0; side < ALB_SIDES; side++) {
+        const alb_fitted *fitted = &fitting->sides[side][0].outcome.fitted;
+        double squares = 0;
+        int count = 0;
+        for (double r = 1; r < 6; r *= 1.05, count++) {
+            const double truth = alb_kernel_value(glow_kernel(side), r);
+            squares += pow(alb_profile_value(&fitted->profile, r) / truth - 1, 2);
+        }
+        print_message("%s under a disc of 1 mm: %s, total %+.2f %%, S beyond the disc %.2f %% rms off\n",
+                      alb_side_names[side], alb_form_name(fitted->profile.form),
+                      100 * (fitted->total / total[side] - 1), 100 * sqrt(squares / count));
+        check_relative(fitted->total, total[side], 0.003);
+        check_below(sqrt(squares / count), 0.02); // of which the photons' noise is 0.5 %
+    }
+    alb_fitting_free(fitting);
+    free(fitting);
 }
 
 static void coarse_pixel(void **state)
@@ -114,72 +125,83 @@ static void coarse_pixel(void **state)
     static const double pixel_free_paths[] = {0.3, 0.6, 1};
     for (int i = 0; i < 3; i++) {
         const double pitch = pixel_free_paths[i] * glow_free_path_mm;
-        const bias found = one_spot(ALB_REFLECTION, (glow_spot){false, 0.25}, pitch, 1.5 * pitch, true);
-        const bias ignored = one_spot(ALB_REFLECTION, (glow_spot){false, 0.25}, pitch, 1.5 * pitch, false);
-        (void)found;
-        (void)ignored;
+        double ignored;
+        const glow_spot kind = {false, 0.1};
+        const double from_mm = pitch, worst = convolution_bias(&ignored, ALB_REFLECTION, kind, pitch, from_mm, true),
+                     points = convolution_bias(&ignored, ALB_REFLECTION, kind, pitch, from_mm, false);
+        print_message("pixels of %.1f mean free paths: %.2f %% off beyond one pixel; pixels taken as points: %.1f %%\n",
+                      pixel_free_paths[i], 100 * worst, 100 * points);
+        check_below(worst, 0.01);
     }
 }
 
-// rms distance of the centre from the truth over noise and places within a pixel, in pixels; *ratio: against its
-// Cramer-Rao bound, 1 / sd^2 = sum m'^2 cos^2 / variance; *told: against the covariance that comes with it.
-static double centre_rms(double *ratio, double *told, double clipped_px, double noise, int trials)
+// Of the distance of a centre from the truth: mean squares in pixels^2, against the Cramer-Rao bound
+// 1 / sd^2 = sum m'^2 cos^2 / variance, and against the covariance that comes with it.
+typedef struct misses {
+    double px2, bound, told;
+} misses;
+
+static void add_miss(misses *sum, double clipped_px, double pitch, double x, double y)
 {
-    const double pitch = 0.08, middle = pitch * GLOW_SIZE / 2;
-    double squares = 0, scaled = 0, by_told = 0;
     static bool glint[GLOW_SIZE * GLOW_SIZE];
-    for (unsigned t = 0; t < (unsigned)trials; t++) {
-        alb_error error = {0};
-        alb_centre found;
-        alb_random random = alb_random_at(31, 0, t);
-        const double x = middle + pitch * alb_random_uniform(&random), y = middle + pitch * alb_random_uniform(&random);
-        double information = 0;
-        glow_paint(picture, light, pitch, x, y);
-        glow_expose(picture, noise, 100 + t);
-        for (int i = 0; i < GLOW_SIZE * GLOW_SIZE; i++) {
-            const double dx = picture->face.x_mm[i] - x, dy = picture->face.y_mm[i] - y, r = hypot(dx, dy), h = 0.02;
-            if (r < clipped_px * pitch) {
-                picture->value[i] = NAN;
-                continue;
-            }
-            const double slope = (glow_at(light->lit, r + h) - glow_at(light->lit, fabs(r - h))) / (2 * h);
-            information += slope * slope * dx * dx / (r * r + 1e-12) / picture->variance[i];
+    alb_error error = {0};
+    alb_centre found;
+    double information = 0;
+    for (int i = 0; i < GLOW_SIZE * GLOW_SIZE; i++) {
+        const double dx = picture->face.x_mm[i] - x, dy = picture->face.y_mm[i] - y, r = hypot(dx, dy), h = 0.02;
+        if (r < clipped_px * pitch) {
+            picture->value[i] = NAN;
+            continue;
         }
-        const alb_channel channel = glow_channel(picture);
-        check_ok(alb_centre_find(&found, glint, true, &channel, &error), &error);
-        const double ex = found.x_mm - x, ey = found.y_mm - y;
-        squares += (ex * ex + ey * ey) / (pitch * pitch * trials);
-        scaled += (ex * ex + ey * ey) * information / (2 * trials);
-        by_told += (ex * ex / found.covariance_mm2[0] + ey * ey / found.covariance_mm2[2]) / (2 * trials);
+        const double slope = (glow_at(light->lit, r + h) - glow_at(light->lit, fabs(r - h))) / (2 * h);
+        information += slope * slope * dx * dx / (r * r + 1e-12) / picture->variance[i];
     }
-    *ratio = sqrt(scaled);
-    *told = sqrt(by_told);
-    return sqrt(squares);
+    const alb_channel channel = glow_channel(picture);
+    check_ok(alb_centre_find(&found, glint, true, &channel, &error), &error);
+    const double ex = found.x_mm - x, ey = found.y_mm - y;
+    sum->px2 += (ex * ex + ey * ey) / (pitch * pitch);
+    sum->bound += (ex * ex + ey * ey) * information / 2;
+    sum->told += (ex * ex / found.covariance_mm2[0] + ey * ey / found.covariance_mm2[2]) / 2;
 }
 
-// Clipped out to 1, 3 and 10 pixels; a disc of radius 0.25 mm is 3 pixels wide.
+// Over noise and places within a pixel; clipped out to 1, 3 and 10 pixels. The disc of radius 0.25 mm is 3 pixels wide.
 static void saturated_core(void **state)
 {
     (void)state;
-    enum { TRIALS = 40 };
-    static const double clipped_px[] = {0, 1, 3, 10}, allowed_px[] = {0.02, 0.02, 0.02, 0.05};
-    static const double noises[] = {0.03, 0.01, 0.001};
+    enum { TRIALS = 40, CLIPS = 4, NOISES = 2 };
+    static const double clipped_px[CLIPS] = {0, 1, 3, 10}, allowed_px[CLIPS] = {0.02, 0.02, 0.02, 0.05};
+    static const double noises[NOISES] = {0.03, 0.003};
+    const double pitch = 0.08, middle = pitch * GLOW_SIZE / 2;
+    misses sums[NOISES][CLIPS] = {{{0}}};
     glow_make(light, 0, (glow_spot){false, 0.25});
-    for (int n = 0; n < 3; n++)
-        for (int i = 0; i < 4; i++) {
-            double ratio, told;
-            const double rms = centre_rms(&ratio, &told, clipped_px[i], noises[n], TRIALS);
+    for (unsigned t = 0; t < TRIALS; t++) {
+        alb_random random = alb_random_at(31, 0, t);
+        const double x = middle + pitch * alb_random_uniform(&random), y = middle + pitch * alb_random_uniform(&random);
+        glow_paint(picture, light, pitch, x, y);
+        for (unsigned n = 0; n < NOISES; n++) {
+            glow_expose(picture, noises[n], 100 + NOISES * t + n);
+            for (int i = 0; i < CLIPS; i++)
+                add_miss(&sums[n][i], clipped_px[i], pitch, x, y);
+        }
+    }
+    for (int n = 0; n < NOISES; n++)
+        for (int i = 0; i < CLIPS; i++) {
+            const double rms = sqrt(sums[n][i].px2 / TRIALS), bound = sqrt(sums[n][i].bound / TRIALS);
             print_message(
                 "noise %.1f %%, clipped out to %2.0f px: centre to %.4f px rms, %.2f of the Cramer-Rao bound, "
                 "%.2f of the sd told\n",
-                100 * noises[n], clipped_px[i], rms, ratio, told);
+                100 * noises[n], clipped_px[i], rms, bound, sqrt(sums[n][i].told / TRIALS));
             check_below(rms, allowed_px[i]);
+            // rms over 80 coordinates scatters by 8 %; where the noise is so low that a thousandth of a pixel is the
+            // bound, the pixels' lattice is what is left
+            if (noises[n] > 0.01)
+                check_below(bound, 1.2 + 3 * 0.08);
         }
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(wide_spot), cmocka_unit_test(coarse_pixel),
-                                       cmocka_unit_test(saturated_core)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(wide_spot), cmocka_unit_test(fit_under_a_wide_spot),
+                                       cmocka_unit_test(coarse_pixel), cmocka_unit_test(saturated_core)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
