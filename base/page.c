@@ -82,6 +82,15 @@ void alb_page_paragraph(alb_page *page, const char *format, ...)
     free(text);
 }
 
+void alb_page_lines(alb_page *page, const char *text)
+{
+    while (*text) {
+        const int length = (int)strcspn(text, "\n");
+        alb_page_paragraph(page, "%.*s", length, text);
+        text += length + (text[length] == '\n');
+    }
+}
+
 // A number, perhaps followed by other numbers, units of percent or an uncertainty: "3.1", "-2 %", "1.0 ± 0.1", "1e-3".
 static bool is_numeric(const char *cell)
 {

@@ -11,6 +11,8 @@ void alb_page_begin(alb_page *page, const char *title, const char *subtitle);
 void alb_page_heading(alb_page *page, const char *text);
 // printf format; the result is escaped.
 void alb_page_paragraph(alb_page *page, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// A paragraph for every line of the text.
+void alb_page_lines(alb_page *page, const char *text);
 // A table: header cells separated by '|', then rows in the same way. Cells are escaped; numeric cells align right.
 void alb_page_table(alb_page *page, const char *header);
 void alb_page_row(alb_page *page, const char *format, ...) __attribute__((format(printf, 2, 3)));

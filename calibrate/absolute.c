@@ -25,6 +25,7 @@ static bool lit_region(disc *region, const alb_image *m, int channels, const cha
 {
     double peak[3] = {0}, su = 0, sv = 0;
     long count = 0, saturated = 0;
+    bool at_edge = false;
     for (int y = 0; y < m->height; y++)
         for (int x = 0; x < m->width; x++)
             for (int c = 0; c < channels; c++) {
@@ -46,6 +47,7 @@ static bool lit_region(disc *region, const alb_image *m, int channels, const cha
                 if (!pass) {
                     su += x, sv += y;
                     count++;
+                    at_edge |= x < 3 || y < 3 || x > m->width - 4 || y > m->height - 4;
                 } else
                     region->radius = fmax(region->radius, hypot(x - region->u, y - region->v));
             }
@@ -54,8 +56,7 @@ static bool lit_region(disc *region, const alb_image *m, int channels, const cha
     if (!count)
         return alb_fail(error, ALB_BAD_DATA,
                         "shot %s: no light is to be seen on the white reference; lengthen the exposure", shot);
-    if (region->u - region->radius < 2 || region->v - region->radius < 2 || region->u + region->radius > m->width - 3 ||
-        region->v + region->radius > m->height - 3)
+    if (at_edge)
         return alb_fail(error, ALB_BAD_DATA,
                         "shot %s: the light on the white reference reaches the edge of the picture", shot);
     region->radius = 1.5 * region->radius + 2;

@@ -141,8 +141,15 @@ static void fit_black(alb_appearance_channel *out, const alb_profile *profile)
     out->burley.length_mm = 1 / (alb_burley_beam_ratio(0) * (profile->parameters[0] + profile->parameters[1]));
 }
 
-static void take_medium(alb_appearance_channel *out, const alb_profile *profile, double refractive_index)
+static void take_medium(alb_appearance_channel *out, const alb_profile *profile, const alb_optical_estimate *measured,
+                        double refractive_index)
 {
+    if (measured->known) {
+        out->medium_source = ALB_MEDIUM_MEASURED;
+        out->absorption_per_mm = measured->absorption_per_mm;
+        out->reduced_scattering_per_mm = measured->reduced_scattering_per_mm;
+        return;
+    }
     if (profile->form == ALB_FORM_DIPOLE) {
         out->medium_source = ALB_MEDIUM_MEASURED;
         out->absorption_per_mm = profile->parameters[0];
@@ -186,7 +193,7 @@ bool alb_appearance_derive(alb_appearance *appearance, const alb_material *mater
             fit_burley(out, &reflection->profile);
         else
             fit_black(out, &reflection->profile);
-        take_medium(out, &reflection->profile, appearance->refractive_index);
+        take_medium(out, &reflection->profile, &material->optical[c], appearance->refractive_index);
     }
     return true;
 }

@@ -29,18 +29,18 @@ typedef long long whole __attribute__((vector_size(32)));
 
 static inline __attribute__((always_inline)) void exponentiate(lanes *v)
 {
-    static const double taylor[] = {
-        1.0 / 479001600, 1.0 / 39916800, 1.0 / 3628800, 1.0 / 362880, 1.0 / 40320, 1.0 / 5040, 1.0 / 720,
-        1.0 / 120,       1.0 / 24,       1.0 / 6,       0.5,          1,           1};
     lanes x = *v;
     const whole low = x < SPLAT(-300.0);
     x = (lanes)(((whole)SPLAT(-300.0) & low) | ((whole)x & ~low));
     const lanes shifted = x * SPLAT(M_LOG2E) + SPLAT(ROUNDER), k = shifted - SPLAT(ROUNDER);
     // ln 2 in two parts, the first short enough for k times it to be exact
     const lanes y = (x - k * SPLAT(0x1.62e42fee00000p-1)) - k * SPLAT(0x1.a39ef35793c76p-33);
-    lanes sum = SPLAT(taylor[0]);
-    for (int i = 1; i < 13; i++)
-        sum = sum * y + SPLAT(taylor[i]);
+    const lanes y2 = y * y, y4 = y2 * y2;
+    const lanes p0 = (SPLAT(1.0 / 6) * y + SPLAT(0.5)) * y2 + (y + SPLAT(1.0));
+    const lanes p4 = (SPLAT(1.0 / 5040) * y + SPLAT(1.0 / 720)) * y2 + (SPLAT(1.0 / 120) * y + SPLAT(1.0 / 24));
+    const lanes p8 = (SPLAT(1.0 / 39916800) * y + SPLAT(1.0 / 3628800)) * y2 +
+                     (SPLAT(1.0 / 362880) * y + SPLAT(1.0 / 40320)) + SPLAT(1.0 / 479001600) * y4;
+    const lanes sum = p0 + y4 * (p4 + y4 * p8);
     *v = (lanes)((whole)sum + ((whole)shifted << 52));
 }
 
@@ -178,10 +178,16 @@ double alb_term_residual(double *residual, double (*products)[3], const alb_whit
 ALB_VECTOR_CLONES
 double alb_columns_dot(const double *x, const double *y, int rows)
 {
-    lanes sum = SPLAT(0.0);
-    for (int i = 0; i < rows; i += LANES)
-        sum += *(const lanes *)(x + i) * *(const lanes *)(y + i);
-    return SUM(sum);
+    lanes even = SPLAT(0.0), odd = SPLAT(0.0);
+    int i = 0;
+    for (; i + LANES < rows; i += 2 * LANES) {
+        even += *(const lanes *)(x + i) * *(const lanes *)(y + i);
+        odd += *(const lanes *)(x + i + LANES) * *(const lanes *)(y + i + LANES);
+    }
+    if (i < rows)
+        even += *(const lanes *)(x + i) * *(const lanes *)(y + i);
+    even += odd;
+    return SUM(even);
 }
 
 // Four columns at a time against one.
@@ -270,7 +276,7 @@ static void fill_nodes(double *columns, const alb_basis *basis, double shift, do
 // Bounds of ln b: the slowest term falls by 1 % over the readings, the fastest by e^40 before the first of them.
 static void set_range(alb_basis *basis, const alb_readings *readings)
 {
-    const double node_step = 0.42, fine_step = 0.11;
+    const double node_step = 0.46, fine_step = 0.11;
     double nearest = readings->outer_mm;
     for (int i = 0; i < readings->count; i++)
         if (readings->r_mm[i] > 0)
@@ -278,12 +284,103 @@ static void set_range(alb_basis *basis, const alb_readings *readings)
     nearest = fmax(nearest, 1e-6 * readings->outer_mm);
     basis->lowest = log(0.01 / readings->outer_mm);
     basis->highest = log(40 / nearest);
-    basis->first = log(0.1 / readings->outer_mm);
+    basis->first = basis->lowest;
     const double range = log(10 / nearest) - basis->first;
     basis->nodes = (int)fmax(ceil(range / node_step), 12);
     basis->step = range / (basis->nodes - 1);
     basis->fine_nodes = (int)ceil((basis->highest - basis->lowest) / fine_step) + 1;
     basis->fine_step = (basis->highest - basis->lowest) / (basis->fine_nodes - 1);
+}
+
+static bool allocate(alb_basis *basis, bool plain, alb_error *error)
+{
+    const size_t rows = (size_t)basis->rows, grid = (size_t)basis->nodes * rows;
+    const size_t table = plain ? rows : (size_t)basis->fine_nodes * rows;
+    return (basis->column = alb_allocate(grid, sizeof(double), error)) &&
+           (basis->tied = alb_allocate(grid, sizeof(double), error)) &&
+           (basis->distance = alb_allocate(table, sizeof(double), error)) &&
+           (plain || (basis->slope = alb_allocate(table, sizeof(double), error))) &&
+           (basis->share = alb_allocate(rows, sizeof(double), error)) &&
+           (basis->area_mm2 = alb_allocate(rows, sizeof(double), error));
+}
+
+static bool fill_columns(alb_basis *basis, alb_error *error)
+{
+    double *work = alb_allocate(3 * (size_t)basis->rows, sizeof *work, error);
+    if (work) {
+        fill_nodes(basis->column, basis, 0, work);
+        fill_nodes(basis->tied, basis, log(ALB_TIED_RATIO), work);
+    }
+    free(work);
+    return work != NULL;
+}
+
+// Groups of neighbours that lie within a fifth of their distance; how many.
+static int group(int *first, const alb_readings *readings)
+{
+    int count = 0;
+    for (int i = 0; i < readings->count; i++) {
+        const double from = count ? readings->r_mm[first[count - 1]] : 0, span = readings->r_mm[i] - from;
+        if (count == 0 || !(span >= 0 && span <= 0.2 * from))
+            first[count++] = i;
+    }
+    first[count] = readings->count;
+    return count;
+}
+
+// Effective distance of the mean of a group of readings, at fine node k.
+static void merge_distance(alb_basis *merged, const alb_basis *basis, int g, int k)
+{
+    const double x = basis->lowest + k * merged->fine_step, b = exp(x);
+    const int from = basis->group[g], to = basis->group[g + 1];
+    double nearest = (double)INFINITY, sum = 0, moment = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = from; i < to; i++) {
+            double rho = basis->distance[i], slope = 0;
+            if (basis->slope) {
+                rho = basis->distance[k * basis->rows + i];
+                slope = basis->slope[k * basis->rows + i];
+            }
+            if (pass == 0) {
+                nearest = fmin(nearest, rho);
+            } else {
+                const double column = basis->share[i] * exp(-b * (rho - nearest));
+                sum += column;
+                moment += column * (rho - nearest + slope);
+            }
+        }
+    const double rho = -log(sum / (to - from) / merged->share[g]) / b;
+    merged->distance[k * merged->rows + g] = nearest + rho;
+    merged->slope[k * merged->rows + g] = moment / sum - rho;
+}
+
+// The same for the plain means of neighbouring readings.
+static bool merge(alb_basis *basis, const alb_readings *readings, alb_error *error)
+{
+    if (!(basis->group = alb_allocate((size_t)basis->count + 1, sizeof *basis->group, error)) ||
+        !(basis->merged = alb_allocate(1, sizeof *basis->merged, error)))
+        return false;
+    alb_basis *merged = basis->merged;
+    *merged = (alb_basis){.count = group(basis->group, readings),
+                          .lowest = basis->lowest,
+                          .highest = basis->highest,
+                          .nodes = basis->nodes,
+                          .first = basis->first,
+                          .step = basis->step,
+                          .fine_nodes = basis->fine_nodes,
+                          .fine_step = basis->fine_step};
+    merged->rows = (merged->count + 1 + LANES - 1) / LANES * LANES;
+    if (!allocate(merged, false, error))
+        return false;
+    for (int g = 0; g < merged->count; g++) {
+        for (int i = basis->group[g]; i < basis->group[g + 1]; i++) {
+            merged->share[g] += basis->share[i] / (basis->group[g + 1] - basis->group[g]);
+            merged->area_mm2[g] += basis->area_mm2[i];
+        }
+        for (int k = 0; k < merged->fine_nodes; k++)
+            merge_distance(merged, basis, g, k);
+    }
+    return fill_columns(merged, error);
 }
 
 bool alb_basis_create(alb_basis *basis, const alb_readings *readings, const alb_operator *forward, alb_error *error)
@@ -294,31 +391,21 @@ bool alb_basis_create(alb_basis *basis, const alb_readings *readings, const alb_
     bool plain = true;
     for (int i = 0; i < n; i++)
         plain &= forward->first[i] == forward->last[i];
-    if (plain)
-        basis->fine_nodes = 1;
-    const size_t rows = (size_t)basis->rows, grid = (size_t)basis->nodes * rows;
-    const size_t table = (size_t)basis->fine_nodes * rows;
-    double *work = alb_allocate(3 * rows, sizeof *work, error);
-    bool ok = work && (basis->column = alb_allocate(grid, sizeof(double), error)) &&
-              (basis->tied = alb_allocate(grid, sizeof(double), error)) &&
-              (basis->distance = alb_allocate(table, sizeof(double), error)) &&
-              (plain || (basis->slope = alb_allocate(table, sizeof(double), error))) &&
-              (basis->share = alb_allocate(rows, sizeof(double), error)) &&
-              (basis->area_mm2 = alb_allocate(rows, sizeof(double), error)) &&
-              fill_distances(basis, forward, plain, error);
-    if (ok) {
+    bool ok = allocate(basis, plain, error) && fill_distances(basis, forward, plain, error);
+    if (ok)
         memcpy(basis->area_mm2, readings->area_mm2, (size_t)n * sizeof(double));
-        fill_nodes(basis->column, basis, 0, work);
-        fill_nodes(basis->tied, basis, log(ALB_TIED_RATIO), work);
-    } else {
+    ok = ok && fill_columns(basis, error) && merge(basis, readings, error);
+    if (!ok)
         alb_basis_free(basis);
-    }
-    free(work);
     return ok;
 }
 
 void alb_basis_free(alb_basis *basis)
 {
+    if (basis->merged)
+        alb_basis_free(basis->merged);
+    free(basis->merged);
+    free(basis->group);
     free(basis->column);
     free(basis->tied);
     free(basis->distance);

@@ -15,6 +15,8 @@ typedef struct alb_basis {
     int fine_nodes;           // from `lowest` on
     double fine_step;
     double *share, *area_mm2; // rows: reading of S = 1; area that a reading stands for
+    int *group;               // readings [group[g], group[g + 1]) are one of `merged`
+    struct alb_basis *merged; // of neighbouring readings merged, for the first steps of a search; NULL there
 } alb_basis;
 
 bool alb_basis_create(alb_basis *basis, const alb_readings *readings, const alb_operator *forward, alb_error *error);

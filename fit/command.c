@@ -112,6 +112,26 @@ static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
            outcome->slope_from_mm, outcome->slope_to_mm);
 }
 
+static void print_spread(const char *name, const alb_spread *spread, double wanted)
+{
+    printf("%16s%-10s %.5g +- %.2g  between spots %.2g  chi-square %.4g / %d  %s\n", "", name, spread->mean,
+           spread->mean_sd, spread->between, spread->chi_square, spread->count - 1,
+           spread->tail < wanted ? "DIFFERS" : "alike");
+}
+
+static void print_map(const alb_map *map, const alb_material *material)
+{
+    for (int side = 0; side < ALB_SIDES; side++)
+        for (int c = 0; c < material->channels && map->layers[side][c].spots; c++) {
+            const alb_map_layer *layer = &map->layers[side][c];
+            printf("%-12s %-2s %-19s %d of %d x %d spots\n", alb_side_names[side], material->channel_names[c],
+                   alb_form_name(layer->candidate.form), layer->total.count, map->columns, map->rows);
+            print_spread("total", &layer->total, map->tail_wanted);
+            print_spread("half in mm", &layer->half, map->tail_wanted);
+        }
+    printf("the sample is %s everywhere\n", map->heterogeneous ? "NOT ALIKE" : "alike");
+}
+
 static void note_border(const alb_fitting *fitting, alb_side side, alb_text *notes)
 {
     double complete_mm = INFINITY;
@@ -166,12 +186,12 @@ static void examine(alb_fitting *fitting, bool absolute, alb_text *notes, alb_er
     }
 }
 
-static bool fit_request(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes, const request *r,
-                        alb_error *error)
+static bool fit_request(alb_fitting *fitting, alb_map *map, alb_provenance *provenance, alb_text *notes,
+                        const request *r, alb_error *error)
 {
     if (r->session) {
         snprintf(provenance->options, sizeof provenance->options, "--anisotropy %.9g", r->anisotropy);
-        return alb_fitting_from_session(fitting, provenance, notes, r->session, error);
+        return alb_fitting_from_session(fitting, map, provenance, notes, r->session, error);
     }
     if (r->table) {
         snprintf(provenance->options, sizeof provenance->options, "--table %s --side %s", alb_path_name(r->table),
@@ -202,11 +222,13 @@ static bool fit_request(alb_fitting *fitting, alb_provenance *provenance, alb_te
     return alb_fitting_from_images(fitting, provenance, notes, paths, setting, error);
 }
 
-static bool write_results(const alb_fitting *fitting, const alb_provenance *provenance, const alb_text *notes,
-                          const request *r, alb_error *error)
+static bool write_results(const alb_fitting *fitting, const alb_map *map, const alb_provenance *provenance,
+                          const alb_text *notes, const request *r, alb_error *error)
 {
+    const char *said = notes->bytes ? notes->bytes : "";
     if (!alb_file_make_directory(r->out, error) ||
-        !alb_fitting_report(fitting, notes->bytes ? notes->bytes : "", r->out, error) ||
+        !(map->columns ? alb_map_write(map, fitting, provenance, said, r->out, error)
+                       : alb_fitting_report(fitting, said, r->out, error)) ||
         !alb_material_write(fitting, provenance, r->out, error))
         return false;
     if (r->as_json) {
@@ -214,6 +236,10 @@ static bool write_results(const alb_fitting *fitting, const alb_provenance *prov
         alb_json_begin(&json, provenance);
         alb_material_put(&json, fitting);
         return alb_json_print(&json, error);
+    }
+    if (map->columns) {
+        print_map(map, &fitting->material);
+        return true;
     }
     for (int side = 0; side < ALB_SIDES; side++)
         for (int c = 0; c < fitting->material.channels; c++)
@@ -247,21 +273,23 @@ static bool run(int argc, char **argv, alb_error *error)
     alb_provenance provenance = {.command = "fit"};
     alb_text notes = {0};
     alb_error failure = {0};
+    alb_map map = {0};
     alb_fitting *fitting = alb_allocate(1, sizeof *fitting, error);
     if (fitting)
         fitting->basis.anisotropy = r.anisotropy;
-    bool ok = fitting && fit_request(fitting, &provenance, &notes, &r, error);
+    bool ok = fitting && fit_request(fitting, &map, &provenance, &notes, &r, error);
     if (ok) {
         examine(fitting, r.session != NULL, &notes, &failure);
         if (notes.bytes)
             fputs(notes.bytes, stderr);
-        ok = write_results(fitting, &provenance, &notes, &r, error);
+        ok = write_results(fitting, &map, &provenance, &notes, &r, error);
     }
     if (ok && failure.status != ALB_OK)
         ok = alb_fail(error, failure.status, "%s", failure.text);
     if (fitting)
         alb_fitting_free(fitting);
     free(fitting);
+    alb_map_free(&map);
     alb_text_free(&notes);
     return ok;
 }

@@ -1,10 +1,11 @@
 // Fits of many spots, and the test of whether they are alike.
 //
 // All spots have one form, so that their parameters compare: the one that most of VOTERS spots, evenly spread, take by
-// themselves (choose.c); of two that are taken as often the simpler one. Each spot is fitted against its own noise
-// alone: what all share (scale, a form that is an approximation) moves them together and is in the mean material's sd.
-// Two quantities say whether the spots are alike, for every form has them and they are known better than its
-// parameters: the total, and the distance h within which half of it leaves, P(h) = total / (4 pi), whose derivatives
+// themselves (choose.c); of two that are taken as often the simpler one. Each spot is fitted from where those came out,
+// the best of them counts, and against its own noise alone: what all share (scale, a form that is an approximation)
+// moves them together and is in the mean material's sd. Two quantities say whether the spots are alike, for every form
+// has them and they are known better than its parameters: the total, and the distance h within which half of it leaves,
+// P(h) = total / (4 pi), whose derivatives
 //   dh/dp = (dtotal/dp / (4 pi) - dP/dp) / (S(h) h)
 // carry the covariance to its sd. Alike: sum (x_i - mean)^2 / sd_i^2 is chi-square distributed with n - 1 degrees of
 // freedom. Stops being true where the sd are not small against the values (a spot known to half of itself), or where
@@ -18,7 +19,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { VOTERS = 12 };
+enum { VOTERS = 6 };
 
 alb_spread alb_spread_of(const double *values, const double *sd, int count)
 {
@@ -69,29 +70,42 @@ static void half_light(double *half_mm, double *half_sd_mm, const alb_fitted *fi
     *half_sd_mm = sqrt(fmax(variance, 0));
 }
 
-// Fits one spot; form NONE where its readings do not decide.
-static bool fit_spot(alb_fitted *fitted, alb_candidate candidate, double flux_sd, const alb_readings *readings,
+// What spots start from: the form, and the profiles of those asked that took it.
+typedef struct starts {
+    alb_candidate candidate;
+    int count;
+    alb_profile profiles[VOTERS];
+} starts;
+
+// Fits one spot, from every start; form NONE where its readings do not decide.
+static bool fit_spot(alb_fitted *fitted, const starts *from, double flux_sd, const alb_readings *readings,
                      const alb_operator *forward, alb_error *error)
 {
     const alb_weighing weighing = {readings, forward, readings->sd, 0};
-    const int n = alb_form_parameter_count(candidate.form);
-    alb_basis basis = {0};
-    bool found = false, full_rank = false;
+    const int n = alb_form_parameter_count(from->candidate.form);
+    bool full_rank = false;
     int which;
     double gradient[ALB_PARAMETERS_MAX], variance = 0;
-    *fitted = (alb_fitted){0};
-    bool ok = alb_basis_create(&basis, readings, forward, error) &&
-              alb_search(&fitted->profile, &fitted->chi_square, &found, candidate, &basis, &weighing, error) &&
-              (!found ||
-               alb_search_covariance(fitted->covariance, &full_rank, &fitted->profile, candidate, &weighing, error));
-    alb_basis_free(&basis);
+    *fitted = (alb_fitted){.chi_square = INFINITY};
+    for (int i = 0; i < from->count; i++) {
+        alb_profile profile = from->profiles[i];
+        double chi_square = INFINITY;
+        if (!alb_search_polish(&profile, &chi_square, from->candidate, &weighing, error))
+            return false;
+        if (chi_square < fitted->chi_square) {
+            fitted->profile = profile;
+            fitted->chi_square = chi_square;
+        }
+    }
+    if (!alb_search_covariance(fitted->covariance, &full_rank, &fitted->profile, from->candidate, &weighing, error))
+        return false;
     fitted->identifiable =
-        ok && found && alb_parameters_decided(&which, &fitted->profile, full_rank, fitted->covariance);
+        isfinite(fitted->chi_square) && alb_parameters_decided(&which, &fitted->profile, full_rank, fitted->covariance);
     if (!fitted->identifiable) {
         *fitted = (alb_fitted){0};
-        return ok;
+        return true;
     }
-    fitted->degrees_of_freedom = readings->count - alb_candidate_parameters(candidate);
+    fitted->degrees_of_freedom = readings->count - alb_candidate_parameters(from->candidate);
     fitted->total = alb_profile_total_gradient(gradient, &fitted->profile);
     for (int p = 0; p < n; p++) {
         fitted->sd[p] = sqrt(fitted->covariance[p][p]);
@@ -104,6 +118,7 @@ static bool fit_spot(alb_fitted *fitted, alb_candidate candidate, double flux_sd
 
 typedef struct ballot {
     alb_candidate candidate;
+    alb_profile profile;
     bool decided;
     alb_error reason;
 } ballot;
@@ -118,6 +133,7 @@ static ballot ask_spot(int spot, alb_map_read read, const void *context)
         alb_choose(&outcome, &readings, &forward, (alb_common_sd){0, 0}, &out.reason)) {
         out.decided = outcome.fitted.identifiable;
         out.candidate = (alb_candidate){outcome.fitted.profile.form, outcome.tied};
+        out.profile = outcome.fitted.profile;
         if (!out.decided)
             alb_fail(&out.reason, ALB_UNDECIDED, "%s", outcome.undecided);
     }
@@ -126,9 +142,15 @@ static ballot ask_spot(int spot, alb_map_read read, const void *context)
     return out;
 }
 
-static bool vote(alb_candidate *candidate, int count, alb_map_read read, const void *context, alb_error *error)
+static bool agree(const ballot *a, const ballot *b)
+{
+    return a->decided && b->decided && a->candidate.form == b->candidate.form && a->candidate.tied == b->candidate.tied;
+}
+
+static bool vote(starts *from, int count, alb_map_read read, const void *context, alb_error *error)
 {
     ballot ballots[VOTERS] = {{.decided = false}};
+    const ballot *chosen = NULL;
     const int voters = count < VOTERS ? count : VOTERS;
     int most = 0;
 #pragma omp parallel for schedule(dynamic)
@@ -137,19 +159,22 @@ static bool vote(alb_candidate *candidate, int count, alb_map_read read, const v
     for (int v = 0; v < voters; v++) {
         int same = 0;
         for (int w = 0; w < voters; w++)
-            same += ballots[w].decided && ballots[w].candidate.form == ballots[v].candidate.form &&
-                    ballots[w].candidate.tied == ballots[v].candidate.tied;
-        const bool simpler = alb_candidate_parameters(ballots[v].candidate) < alb_candidate_parameters(*candidate);
-        if (ballots[v].decided && (same > most || (same == most && simpler))) {
+            same += agree(&ballots[v], &ballots[w]);
+        if (same > most ||
+            (same && same == most &&
+             alb_candidate_parameters(ballots[v].candidate) < alb_candidate_parameters(chosen->candidate))) {
             most = same;
-            *candidate = ballots[v].candidate;
+            chosen = &ballots[v];
         }
     }
-    for (int v = 0; v < voters && most == 0; v++)
-        if (ballots[v].reason.status == ALB_NO_MEMORY)
-            return alb_fail(error, ALB_NO_MEMORY, "%s", ballots[v].reason.text);
-    return most > 0 ||
-           alb_fail(error, ALB_UNDECIDED, "no spot of %d asked decides; the first: %s", voters, ballots[0].reason.text);
+    if (!chosen)
+        return alb_fail(error, ballots[0].reason.status == ALB_NO_MEMORY ? ALB_NO_MEMORY : ALB_UNDECIDED,
+                        "none of the %d spots asked decides; the first: %s", voters, ballots[0].reason.text);
+    *from = (starts){.candidate = chosen->candidate};
+    for (int v = 0; v < voters; v++)
+        if (agree(chosen, &ballots[v]))
+            from->profiles[from->count++] = ballots[v].profile;
+    return true;
 }
 
 static bool allocate(alb_map_layer *layer, int count, alb_error *error)
@@ -193,14 +218,14 @@ bool alb_map_layer_fit(alb_map_layer *layer, int count, double flux_sd, alb_map_
                        const char *label, alb_error *error)
 {
     alb_progress progress;
-    alb_candidate candidate = {ALB_FORM_NONE, false};
+    starts from;
     bool out_of_memory = false;
     int done = 0;
-    if (!allocate(layer, count, error) || !vote(&candidate, count, read, context, error)) {
+    if (!allocate(layer, count, error) || !vote(&from, count, read, context, error)) {
         alb_map_layer_free(layer);
         return false;
     }
-    layer->candidate = candidate;
+    layer->candidate = from.candidate;
     alb_progress_begin(&progress, label, count);
 #pragma omp parallel for schedule(dynamic)
     for (int i = 0; i < count; i++) {
@@ -209,7 +234,7 @@ bool alb_map_layer_fit(alb_map_layer *layer, int count, double flux_sd, alb_map_
         alb_error reason = {0};
         layer->half_mm[i] = layer->half_sd_mm[i] = NAN;
         if (read(&readings, &forward, i, context, &reason) &&
-            fit_spot(&layer->spots[i], candidate, flux_sd, &readings, &forward, &reason) &&
+            fit_spot(&layer->spots[i], &from, flux_sd, &readings, &forward, &reason) &&
             layer->spots[i].profile.form != ALB_FORM_NONE)
             half_light(&layer->half_mm[i], &layer->half_sd_mm[i], &layer->spots[i]);
         alb_readings_free(&readings);

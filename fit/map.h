@@ -1,6 +1,10 @@
 // Many spots of one sample: the same form fitted to each, and whether they differ by more than their noise.
 #pragma once
+#include "base/text.h"
+#include "calibrate/calibration.h"
+#include "fit/measurement.h"
 #include "fit/search.h"
+#include "fit/site.h"
 
 // Values of one quantity over the spots, each with an sd of its own.
 typedef struct alb_spread {
@@ -32,3 +36,29 @@ typedef bool (*alb_map_read)(alb_readings *readings, alb_operator *forward, int 
 bool alb_map_layer_fit(alb_map_layer *layer, int count, double flux_sd, alb_map_read read, const void *context,
                        const char *label, alb_error *error);
 void alb_map_layer_free(alb_map_layer *layer);
+
+// A grid of spots on one sample.
+typedef struct alb_map {
+    int columns, rows;          // 0: no grid
+    alb_site *sites[ALB_SIDES]; // columns * rows, row by row; NULL where the side was not measured
+    alb_map_layer layers[ALB_SIDES][3];
+    double tail_wanted; // quantities whose tail is below differ between the spots
+    bool heterogeneous; // one of them does; of 100 samples that are alike 5 are called so
+} alb_map;
+
+// Whether the calibrated session holds a grid on the slab.
+bool alb_map_is_wanted(const alb_calibration *calibration);
+// Fits every spot of the session's grids; fills the material's mean (fitting->material and the outcomes, measured) and,
+// as the other sources do, inputs and notes. Fails as they do.
+bool alb_map_from_session(alb_map *map, alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
+                          const alb_calibration *calibration, alb_error *error);
+void alb_map_free(alb_map *map);
+
+// folder/report/map.html.
+bool alb_map_report(const alb_map *map, const alb_material *material, const char *notes, const char *folder,
+                    alb_error *error);
+// folder/map.json, folder/map/<side>.exr (total and half_light_mm with their sd, per channel) and
+// folder/map/<side>_<channel>.exr (the form's parameters with their sd), a pixel a spot, NaN where it is not decided;
+// and the page.
+bool alb_map_write(const alb_map *map, const alb_fitting *fitting, const alb_provenance *provenance, const char *notes,
+                   const char *folder, alb_error *error);

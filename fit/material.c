@@ -12,6 +12,11 @@ static void find_properties(alb_fitting *fitting)
     for (int i = 0; i < ALB_SIDES * 3; i++)
         fitting->basis.common_sd[i / 3][i % 3] = fitting->sides[i / 3][i % 3].common.flux;
     alb_properties_find(fitting->properties, &fitting->material, &fitting->basis);
+    for (int c = 0; c < 3; c++) {
+        const alb_optical *optical = &fitting->properties[c].optical;
+        fitting->material.optical[c] = (alb_optical_estimate){fitting->properties[c].known, optical->absorption_per_mm,
+                                                              optical->reduced_scattering_per_mm};
+    }
 }
 
 bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
@@ -272,7 +277,7 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
         snprintf(material->channel_names[c], sizeof material->channel_names[0], "%s", key);
         if (!alb_node_object(&channel, channels, key, error) ||
             !alb_node_allow(channel, "reflection transmission optical_properties", error) ||
-            !alb_properties_check(channel, error))
+            !alb_properties_read(&material->optical[c], channel, error))
             return false;
         for (int side = 0; side < ALB_SIDES; side++)
             if (alb_node_has(channel, alb_side_names[side]) &&

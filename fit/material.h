@@ -55,6 +55,12 @@ typedef struct alb_fitted {
     bool identifiable;
 } alb_fitted;
 
+// Absorption sigma_a and reduced scattering sigma_s' of a channel, where they were measured.
+typedef struct alb_optical_estimate {
+    bool known;
+    double absorption_per_mm, reduced_scattering_per_mm;
+} alb_optical_estimate;
+
 typedef struct alb_material {
     char name[ALB_NAME_SIZE];
     double thickness_mm; // 0: not a slab or not known
@@ -62,6 +68,7 @@ typedef struct alb_material {
     int channels;
     char channel_names[3][8];
     alb_fitted fitted[ALB_SIDES][3];
+    alb_optical_estimate optical[3];
 } alb_material;
 
 bool alb_material_read(alb_material *material, const char *path, alb_error *error);

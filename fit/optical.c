@@ -1,29 +1,11 @@
-// Inversion of totals. A slab of unit thickness has two unknowns, x = (ln sigma_s' d, ln sigma_a d), and two readings,
-// in which it is close to linear: ln of the share that is lost, A = 1 - r - R - T with r = ((n-1)/(n+1))^2, and
-// ln(T/R).
-//
-//   1. Damped Newton on few streams from a first guess: without absorption T/(R + T) is (1 + 2 A/3)/(s' d + 4 A/3) in
-//      diffusion, and light stays 2 n^2 d (its mean path under diffuse light); where that does not lead there, from a
-//      grid of starts over all media.
-//   2. The same equations on many streams, the Jacobian of the few kept and corrected as it goes (Broyden 1965).
-//
-// In this order each forward solution of many streams gains two digits or more, and there is one answer: with x given
-// by the totals of random slabs no second slab was found (test_optical.c). Nothing lost, A <= 0, is sigma_a = 0 and one
-// equation. A half-space has one reading and one unknown, sigma_a / sigma_s'.
+// Optical properties from totals. A slab has two readings and two unknowns (inversion.c), solved on few streams, then
+// on many. A half-space has one reading and one unknown, sigma_a / sigma_s'.
 //
 // Errors are carried linearly: of R and T, their common scale, and thickness, which scales both by its inverse exactly.
 // Stops being true: as adding_doubling.c; and a wrong scale moves sigma_a by many times as much (alb_optical.by_scale).
 #include "fit/optical.h"
+#include "fit/inversion.h"
 #include <math.h>
-
-enum { NEWTON_STEPS = 40, CORRECTIONS = 25, GRID = 7 };
-
-// Totals of a slab of thickness 1 as a function of (sigma_a, sigma_s'), and the share that enters it.
-typedef struct transfer {
-    alb_totals (*totals)(const void *model, double absorption, double scattering);
-    const void *model;
-    double entry;
-} transfer;
 
 static alb_totals by_transport(const void *model, double absorption, double scattering)
 {
@@ -52,155 +34,28 @@ void alb_optical_model_create(alb_optical_model *model, int streams, double n, d
     model->face = alb_diffusion_face_at(ALB_DIFFUSION_GROSJEAN, n);
 }
 
-// What is solved for: lost share and ln(T/R), or, where nothing is lost, ln(T/R) alone.
-typedef struct readings {
-    double log_lost, log_ratio;
-    double rounding[2]; // of ln(T/R) and ln(lost): 1e-12 of the flux
-    bool lossless;
-} readings;
-
-// Residuals of the two equations; false where the model leaves their domain.
-static bool residuals(double f[2], const transfer *slab, const readings *wanted, const double x[2])
-{
-    const alb_totals t = slab->totals(slab->model, wanted->lossless ? 0 : exp(x[1]), exp(x[0]));
-    const double lost = slab->entry - t.reflection - t.transmission;
-    f[0] = log(t.transmission / t.reflection) - wanted->log_ratio;
-    f[1] = wanted->lossless ? 0 : log(lost) - wanted->log_lost;
-    return isfinite(f[0]) && isfinite(f[1]);
-}
-
-static double size_of(const double f[2]) { return fmax(fabs(f[0]), fabs(f[1])); }
-
-static bool jacobian(double j[2][2], const transfer *slab, const readings *wanted, const double x[2], const double f[2])
-{
-    const double h = 1e-5;
-    for (int p = 0; p < 2; p++) {
-        double moved[2] = {x[0], x[1]}, g[2];
-        if (p == 1 && wanted->lossless) {
-            j[0][1] = 0, j[1][1] = 1;
-            break;
-        }
-        moved[p] += h;
-        if (!residuals(g, slab, wanted, moved))
-            return false;
-        for (int i = 0; i < 2; i++)
-            j[i][p] = (g[i] - f[i]) / h;
-    }
-    return true;
-}
-
-// step = -j^-1 f, at most `limit` long in either direction.
-static bool step_of(double step[2], double j[2][2], const double f[2], double limit)
-{
-    const double det = j[0][0] * j[1][1] - j[0][1] * j[1][0];
-    step[0] = -(j[1][1] * f[0] - j[0][1] * f[1]) / det;
-    step[1] = -(j[0][0] * f[1] - j[1][0] * f[0]) / det;
-    const double longest = size_of(step);
-    if (!isfinite(longest))
-        return false;
-    for (int p = 0; p < 2 && longest > limit; p++)
-        step[p] *= limit / longest;
-    return true;
-}
-
-static bool newton(double x[2], const transfer *slab, const readings *wanted, double tolerance)
-{
-    double f[2], j[2][2], step[2];
-    if (!residuals(f, slab, wanted, x))
-        return false;
-    for (int i = 0; i < NEWTON_STEPS && size_of(f) > tolerance; i++) {
-        if (!jacobian(j, slab, wanted, x, f) || !step_of(step, j, f, 2))
-            return false;
-        double share = 1;
-        for (;; share /= 2) {
-            const double y[2] = {x[0] + share * step[0], x[1] + share * step[1]};
-            double g[2];
-            if (residuals(g, slab, wanted, y) && size_of(g) < size_of(f)) {
-                x[0] = y[0], x[1] = y[1], f[0] = g[0], f[1] = g[1];
-                break;
-            }
-            if (share < 1e-3)
-                return false;
-        }
-    }
-    return size_of(f) <= tolerance;
-}
-
-static bool solved(const double f[2], const readings *wanted, double tolerance)
-{
-    return fabs(f[0]) <= tolerance + wanted->rounding[0] && fabs(f[1]) <= tolerance + wanted->rounding[1];
-}
-
-// From the few streams' solution to that of the many.
-static bool correct(double x[2], const transfer *slab, const readings *wanted, double j[2][2])
-{
-    double f[2], g[2], step[2];
-    if (!residuals(f, slab, wanted, x))
-        return false;
-    for (int i = 0; i < CORRECTIONS && !solved(f, wanted, 1e-10); i++) {
-        if (!step_of(step, j, f, 1))
-            return false;
-        const double y[2] = {x[0] + step[0], x[1] + step[1]}, square = step[0] * step[0] + step[1] * step[1];
-        if (!residuals(g, slab, wanted, y))
-            return false;
-        for (int r = 0; r < 2; r++) { // Broyden: j step = g - f, j unchanged across the step
-            const double missed = (g[r] - f[r] - j[r][0] * step[0] - j[r][1] * step[1]) / square;
-            j[r][0] += missed * step[0];
-            j[r][1] += missed * step[1];
-        }
-        x[0] = y[0], x[1] = y[1], f[0] = g[0], f[1] = g[1];
-    }
-    return solved(f, wanted, 1e-8);
-}
-
-static bool first_guess(double x[2], const transfer *slab, const readings *wanted, double tolerance, double boundary,
-                        double n)
-{
-    const double through = 1 / (1 + exp(-wanted->log_ratio)), lost = exp(wanted->log_lost) / slab->entry;
-    x[0] = log(fmax(0.1, (1 + 2 * boundary / 3) / through - 4 * boundary / 3));
-    x[1] = log(fmax(1e-12, -log1p(-fmin(lost, 0.999)) / (2 * n * n)));
-    if (newton(x, slab, wanted, tolerance))
-        return true;
-    for (int i = 0; i < GRID * GRID; i++) { // sigma_s' d from 0.01 to 1e4, sigma_a d from 1e-8 to 100
-        x[0] = log(0.01) + (i % GRID) * log(1e6) / (GRID - 1);
-        x[1] = log(1e-8) + (double)(i / GRID) * log(1e10) / (GRID - 1);
-        if (newton(x, slab, wanted, tolerance))
-            return true;
-    }
-    return false;
-}
-
-static readings readings_of(double entry, double reflection, double transmission)
-{
-    const double lost = entry - reflection - transmission;
-    return (readings){.log_lost = lost > 0 ? log(lost) : -HUGE_VAL,
-                      .log_ratio = log(transmission / reflection),
-                      .rounding = {1e-12 / transmission, lost > 0 ? 1e-12 / lost : 0},
-                      .lossless = !(lost > 1e-10)};
-}
-
 // Standard deviations and sensitivities at x, by the Jacobian of the few streams.
-static bool propagate(alb_optical *out, const transfer *coarse, const double solution[2],
+static bool propagate(alb_optical *out, const alb_transfer *coarse, const double solution[2],
                       const alb_measured_totals *measured)
 {
     const double x[2] = {solution[0], fmax(solution[1], solution[0] - 14)}; // lossless: at the limit of little loss
     const alb_totals t = coarse->totals(coarse->model, exp(x[1]), exp(x[0]));
     const double lost = coarse->entry - t.reflection - t.transmission, d = measured->thickness_mm;
-    const readings here = {.log_lost = log(lost), .log_ratio = log(t.transmission / t.reflection)};
+    const alb_wanted here = {.log_lost = log(lost), .log_ratio = log(t.transmission / t.reflection)};
     const double by_reading[3][2] = {{-1 / t.reflection, -1 / lost}, // of R, T and the scale
                                      {1 / t.transmission, -1 / lost},
                                      {0, -(t.reflection + t.transmission) / lost}};
     const double sd[3] = {measured->reflection_sd, measured->transmission_sd, measured->scale_sd};
     const double zero[2] = {0, 0}, scale[2] = {exp(x[1]) / d, exp(x[0]) / d};
     double j[2][2], covariance[2][2] = {{0}};
-    if (!jacobian(j, coarse, &here, x, zero))
+    if (!alb_slab_jacobian(j, coarse, &here, x, zero))
         return false;
     for (int k = 0; k < 4; k++) {
         double step[2] = {-1, -1}, of[2], size = measured->thickness_sd_mm / d; // thickness
         const double minus[2] = {k < 3 ? -by_reading[k][0] : 0, k < 3 ? -by_reading[k][1] : 0};
         if (k < 3) {
             size = sd[k];
-            if (!step_of(step, j, minus, HUGE_VAL))
+            if (!alb_slab_step(step, j, minus, HUGE_VAL))
                 return false;
         }
         if (k == 2)
@@ -271,13 +126,19 @@ static bool check_totals(const alb_measured_totals *m, double entry, alb_error *
     return true;
 }
 
+// ln of the share that a half-space of sigma_a / sigma_s' = e^x loses, less log_lost.
+static double half_space_residual(const alb_streams *streams, double entry, double log_lost, double x)
+{
+    return log(entry - alb_adding_doubling(streams, exp(x), 1, 0).reflection) - log_lost;
+}
+
 // ln(sigma_a / sigma_s') at which a half-space loses the share exp(log_lost); false position with halved ends
 // (Illinois) in [low, high], in which the share rises.
 static double half_space_at(const alb_streams *streams, double entry, double log_lost, double low, double high)
 {
     double at_low = -HUGE_VAL, at_high = HUGE_VAL, x = (low + high) / 2;
     for (int i = 0, side = 0; i < 100; i++) {
-        const double f = log(entry - alb_adding_doubling(streams, exp(x), 1, 0).reflection) - log_lost;
+        const double f = half_space_residual(streams, entry, log_lost, x);
         if (fabs(f) < 1e-9 || high - low < 1e-12)
             break;
         if (f < 0) {
@@ -294,6 +155,20 @@ static double half_space_at(const alb_streams *streams, double entry, double log
     return x;
 }
 
+// The same on other streams from a solution nearby: secants, the first of the given slope.
+static double half_space_near(const alb_streams *streams, double entry, double log_lost, double x, double slope)
+{
+    double f = half_space_residual(streams, entry, log_lost, x);
+    for (int i = 0; i < 12 && fabs(f) > 1e-9; i++) {
+        const double step = -f / slope, next = half_space_residual(streams, entry, log_lost, x + step);
+        if (!(fabs(next) < fabs(f)))
+            break;
+        slope = (next - f) / step;
+        x += step, f = next;
+    }
+    return fabs(f) < 1e-6 ? x : half_space_at(streams, entry, log_lost, -40, 12);
+}
+
 static bool half_space(alb_optical *out, const alb_optical_model *model, double entry,
                        const alb_measured_totals *measured)
 {
@@ -305,11 +180,11 @@ static bool half_space(alb_optical *out, const alb_optical_model *model, double 
     out->flags = ALB_OPTICAL_RATIO_ONLY | (lost > 2 * sd ? 0 : ALB_OPTICAL_NO_ABSORPTION);
     out->reduced_albedo = 1;
     if (lost > 1e-9) {
-        const double log_lost = log(lost), few = half_space_at(&model->coarse, entry, log_lost, -40, 12),
-                     x = half_space_at(&model->fine, entry, log_lost, few - 1, few + 1), h = 1e-4;
-        const double up = log(entry - alb_adding_doubling(&model->coarse, exp(x + h), 1, 0).reflection),
-                     down = log(entry - alb_adding_doubling(&model->coarse, exp(x - h), 1, 0).reflection);
-        const double ratio = exp(x), slope = (up - down) / (2 * h);
+        const double log_lost = log(lost), few = half_space_at(&model->coarse, entry, log_lost, -40, 12), h = 1e-3;
+        const double slope = (half_space_residual(&model->coarse, entry, log_lost, few + h) -
+                              half_space_residual(&model->coarse, entry, log_lost, few - h)) /
+                             (2 * h);
+        const double ratio = exp(half_space_near(&model->fine, entry, log_lost, few, slope));
         out->reduced_albedo = 1 / (1 + ratio);
         out->reduced_albedo_sd = ratio / ((1 + ratio) * (1 + ratio)) * sd / lost / slope;
     } else { // lost grows as the root of the ratio: what an sd would be lost by
@@ -324,17 +199,17 @@ bool alb_optical_from_totals(alb_optical *out, const alb_optical_model *model, c
                              alb_error *error)
 {
     const double n = model->fine.refractive_index, d = measured->thickness_mm;
-    const transfer coarse = {by_transport, &model->coarse, entry_of(n)},
-                   fine = {by_transport, &model->fine, entry_of(n)};
+    const double entry = entry_of(n), boundary = model->face.boundary;
+    const alb_transfer coarse = {by_transport, &model->coarse, entry, boundary, n},
+                       fine = {by_transport, &model->fine, entry, boundary, n};
     *out = (alb_optical){.diffusion = {NAN, NAN}};
-    if (!check_totals(measured, fine.entry, error))
+    if (!check_totals(measured, entry, error))
         return false;
     if (!(d > 0))
-        return half_space(out, model, fine.entry, measured);
-    const readings wanted = readings_of(fine.entry, measured->reflection, measured->transmission);
-    double x[2], f[2], j[2][2];
-    if (!first_guess(x, &coarse, &wanted, 1e-4, model->face.boundary, n) || !residuals(f, &coarse, &wanted, x) ||
-        !jacobian(j, &coarse, &wanted, x, f) || !correct(x, &fine, &wanted, j))
+        return half_space(out, model, entry, measured);
+    const alb_wanted wanted = alb_wanted_of(entry, measured->reflection, measured->transmission);
+    double x[2];
+    if (!alb_slab_find(x, &coarse, &wanted, 1e-4) || !alb_slab_refine(x, &fine, &coarse, &wanted))
         return alb_fail(error, ALB_BAD_DATA, "reflection %.6g, transmission %.6g: no slab of index %g has these totals",
                         measured->reflection, measured->transmission, n);
     if (wanted.lossless)
@@ -355,10 +230,10 @@ bool alb_optical_from_diffusion(double properties[2], const alb_diffusion_face *
                                 double transmission, double thickness_mm)
 {
     const diffusion_model model = {*face, entry_of(n)};
-    const transfer slab = {by_diffusion, &model, model.entry};
-    const readings wanted = readings_of(model.entry, reflection, transmission);
+    const alb_transfer slab = {by_diffusion, &model, model.entry, face->boundary, n};
+    const alb_wanted wanted = alb_wanted_of(model.entry, reflection, transmission);
     double x[2];
-    if (wanted.lossless || !first_guess(x, &slab, &wanted, 1e-10, face->boundary, n))
+    if (wanted.lossless || !alb_slab_find(x, &slab, &wanted, 1e-10))
         return false;
     properties[0] = exp(x[1]) / thickness_mm;
     properties[1] = exp(x[0]) / thickness_mm;

@@ -125,12 +125,13 @@ void alb_properties_note(alb_text *notes, const char *channel, const alb_propert
     alb_text_add(notes, ".\n");
 }
 
-bool alb_properties_check(alb_node channel, alb_error *error)
+bool alb_properties_read(alb_optical_estimate *out, alb_node channel, alb_error *error)
 {
+    *out = (alb_optical_estimate){0};
     static const char *const estimates[] = {"absorption_per_mm", "reduced_scattering_per_mm", "reduced_albedo"};
     alb_node properties, estimate, flags;
     const char *text;
-    double value;
+    double value, values[3];
     size_t count;
     if (!alb_node_has(channel, "optical_properties"))
         return true;
@@ -152,8 +153,9 @@ bool alb_properties_check(alb_node channel, alb_error *error)
     for (int i = 0; i < 3; i++)
         if (!alb_node_object(&estimate, properties, estimates[i], error) ||
             !alb_node_allow(estimate, "value sd", error) ||
-            !alb_node_number(&value, estimate, "value", 0, 1e300, error) ||
+            !alb_node_number(&values[i], estimate, "value", 0, 1e300, error) ||
             !alb_node_number(&value, estimate, "sd", 0, 1e300, error))
             return false;
+    *out = (alb_optical_estimate){true, values[0], values[1]};
     return true;
 }

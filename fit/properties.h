@@ -30,5 +30,5 @@ void alb_properties_find(alb_properties properties[3], const alb_material *mater
 void alb_properties_put(alb_json *json, const alb_properties *properties);
 // Adds sentences for a reader: values, assumption, flags.
 void alb_properties_note(alb_text *notes, const char *channel, const alb_properties *properties);
-// Checks "optical_properties" of a record, where it is there.
-bool alb_properties_check(alb_node channel, alb_error *error);
+// Reads "optical_properties" of a channel, where it is there; else not known.
+bool alb_properties_read(alb_optical_estimate *estimate, alb_node channel, alb_error *error);

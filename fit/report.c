@@ -110,11 +110,7 @@ static void put_tables(alb_page *page, const alb_fitting *fitting, const char *n
             if (fitting->sides[side][c].measured)
                 put_row(page, fitting, (alb_side)side, c);
     alb_page_end_table(page);
-    for (const char *line = notes; *line;) {
-        const int length = (int)strcspn(line, "\n");
-        alb_page_paragraph(page, "%.*s", length, line);
-        line += length + (line[length] == '\n');
-    }
+    alb_page_lines(page, notes);
     alb_page_heading(page, "Forms tried");
     alb_page_table(page, "side|channel|form|chi-square|BIC|rejected because");
     for (int side = 0; side < ALB_SIDES; side++)

@@ -204,8 +204,8 @@ static bool observe_products(alb_fitting *fitting, alb_provenance *provenance, a
     return ok;
 }
 
-bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes, const char *folder,
-                              alb_error *error)
+bool alb_fitting_from_session(alb_fitting *fitting, alb_map *map, alb_provenance *provenance, alb_text *notes,
+                              const char *folder, alb_error *error)
 {
     char path[ALB_PATH_SIZE];
     alb_material *material = &fitting->material;
@@ -221,8 +221,10 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, 
         fitting->basis.own_sd = calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0;
         material->channels = calibration->channels;
         memcpy(material->channel_names, calibration->channel_names, sizeof material->channel_names);
-        ok = observe_products(fitting, provenance, notes, calibration, error) && alb_fitting_run(fitting, error);
-        if (ok)
+        if (alb_map_is_wanted(calibration))
+            ok = alb_map_from_session(map, fitting, provenance, notes, calibration, error);
+        else if ((ok = observe_products(fitting, provenance, notes, calibration, error) &&
+                       alb_fitting_run(fitting, error)))
             alb_photo_note_border(notes, fitting);
     }
     free(calibration);

@@ -3,10 +3,14 @@
 #pragma once
 #include "base/text.h"
 #include "fit/curvature.h"
+#include "fit/map.h"
 #include "fit/measurement.h"
 
-bool alb_fitting_from_session(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes, const char *folder,
-                              alb_error *error);
+// Where the session holds a grid and no single spot, `map` is filled too (free with alb_map_free), and the material is
+// the mean of the spots.
+bool alb_fitting_from_session(alb_fitting *fitting, alb_map *map, alb_provenance *provenance, alb_text *notes,
+                              const char *folder, alb_error *error);
+
 // What is known of images by hand. The light: a spot measured on an opaque white face, or a Gaussian, or an even disc.
 typedef struct alb_image_setting {
     double mm_per_pixel;

@@ -257,10 +257,10 @@ static void widen_intervals(alb_outcome *outcome, int n, alb_common_sd common, d
     knowledge->total.upper = widened(knowledge->total.upper, total, sd);
 }
 
-// What all readings share, by the powers in which parameters hold flux and length.
-static void add_common(alb_fitted *fitted, int n, alb_common_sd common)
+void alb_common_add(alb_fitted *fitted, alb_common_sd common)
 {
     const double *values = fitted->profile.parameters;
+    const int n = alb_form_parameter_count(fitted->profile.form);
     for (int p = 0; p < n; p++)
         for (int q = 0; q < n; q++) {
             const alb_parameter *one = alb_form_parameter(fitted->profile.form, p);
@@ -333,7 +333,7 @@ bool alb_outcome_complete(alb_outcome *outcome, alb_candidate candidate, const a
     if (!alb_knowledge_find(&outcome->knowledge, profile, candidate, weighing, error))
         return false;
     widen_intervals(outcome, n, common, sqrt(extra));
-    add_common(fitted, n, common);
+    alb_common_add(fitted, common);
     fitted->total_sd = sqrt(variance + fitted->total * fitted->total * common.flux * common.flux);
     for (int p = 0; p < n; p++)
         fitted->sd[p] = sqrt(fitted->covariance[p][p]);

@@ -33,6 +33,8 @@ bool alb_identify(bool *identifiable, char because[ALB_BECAUSE_SIZE], const alb_
 // energy_sd the sd of the measured energy. Fails only for want of memory.
 bool alb_outcome_complete(struct alb_outcome *outcome, alb_candidate candidate, const alb_weighing *weighing,
                           double energy_sd, struct alb_common_sd common, alb_error *error);
+// Adds to the covariance what all readings share, by the powers in which parameters hold flux and length.
+void alb_common_add(alb_fitted *fitted, struct alb_common_sd common);
 // What compares the outcome's profile with the readings: chi-square, rms, the share of the total that was measured, the
 // slope of the tail.
 bool alb_outcome_describe_fit(struct alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward,

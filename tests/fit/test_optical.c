@@ -168,6 +168,26 @@ static void single_scattering(void **state)
     }
 }
 
+// What it costs to take g = 0 where it is 0.9: little on 10 mean free paths, much on a fifth of one.
+static void similarity_fails_when_thin(void **state)
+{
+    (void)state;
+    alb_optical_model isotropic;
+    alb_optical_model_create(&isotropic, ALB_OPTICAL_STREAMS, 1.5, 0);
+    for (int thin = 0; thin < 2; thin++) {
+        const double a = 0.01, reduced = 2, d = thin ? 0.1 : 5;
+        const alb_medium medium = {a, reduced / 0.1, 0.9, 1.5, d};
+        const alb_measured_totals totals = exact(&medium);
+        const alb_optical out = inverted(&isotropic, &totals);
+        const double error[2] = {out.absorption_per_mm / a - 1, out.reduced_scattering_per_mm / reduced - 1};
+        print_message("%g mm, g 0 for 0.9: sigma_a %+.1f %%, sigma_s' %+.1f %%\n", d, 100 * error[0], 100 * error[1]);
+        if (thin)
+            assert_true(error[0] < -0.05 && error[1] > 0.15);
+        else
+            assert_true(fabs(error[0]) < 0.02 && fabs(error[1]) < 0.02);
+    }
+}
+
 // alpha' below 0.8: transport holds, diffusion is not quoted.
 static void low_albedo(void **state)
 {
@@ -342,6 +362,7 @@ int main(void)
         cmocka_unit_test(round_trips_of_random_media),
         cmocka_unit_test(error_bars_are_honest),
         cmocka_unit_test(single_scattering),
+        cmocka_unit_test(similarity_fails_when_thin),
         cmocka_unit_test(low_albedo),
         cmocka_unit_test(albedo_near_1),
         cmocka_unit_test(thickness_wrong),

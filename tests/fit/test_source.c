@@ -121,8 +121,9 @@ static void session_gives_totals(void **state)
     alb_provenance provenance = {.command = "fit"};
     alb_text notes = {0};
     alb_fitting *fitting = calloc(1, sizeof *fitting);
+    alb_map map = {0};
     make_session();
-    check_ok(alb_fitting_from_session(fitting, &provenance, &notes, "s", &error), &error);
+    check_ok(alb_fitting_from_session(fitting, &map, &provenance, &notes, "s", &error), &error);
     for (int side = 0; side < ALB_SIDES; side++) {
         const alb_fitted *fitted = &fitting->material.fitted[side][0];
         const double total = alb_profile_total(&truth[side]);
@@ -188,12 +189,13 @@ static void what_is_missing_is_named(void **state)
     alb_provenance provenance = {.command = "fit"};
     alb_text notes = {0};
     alb_fitting *fitting = calloc(1, sizeof *fitting);
+    alb_map map = {0};
     make_session();
     remove(files[2]);
-    check_fails(alb_fitting_from_session(fitting, &provenance, &notes, "s", &error), &error, ALB_ACCESS,
+    check_fails(alb_fitting_from_session(fitting, &map, &provenance, &notes, "s", &error), &error, ALB_ACCESS,
                 "transmission.exr");
     alb_fitting_free(fitting);
-    check_fails(alb_fitting_from_session(fitting, &provenance, &notes, "nowhere", &error), &error, ALB_ACCESS,
+    check_fails(alb_fitting_from_session(fitting, &map, &provenance, &notes, "nowhere", &error), &error, ALB_ACCESS,
                 "nowhere");
     const char *const paths[ALB_SIDES] = {NULL, "nowhere.exr"};
     check_fails(

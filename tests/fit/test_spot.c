@@ -1,6 +1,7 @@
 // Spots of finite size, coarse pixels, clipped cores and centres off the middle: the pictures of glow.h.
 #include "fit/centre.h"
 #include "fit/measurement.h"
+#include "fit/ring.h"
 #include "glow.h"
 
 static glow_picture *picture;
@@ -199,9 +200,81 @@ static void saturated_core(void **state)
         }
 }
 
+// The middle of the spot 0.1, 0.2 and 0.5 mm off that of the picture: rings about the centre that is found, and about
+// the picture's middle. The first is what is fitted.
+static void off_centre(void **state)
+{
+    (void)state;
+    static const double off_mm[] = {0.1, 0.2, 0.5};
+    const double pitch = 0.05, middle = pitch * GLOW_SIZE / 2;
+    static alb_rings about_middle;
+    glow_make(light, 0, (glow_spot){false, 0.25});
+    for (int k = 0; k < 3; k++) {
+        alb_error error = {0};
+        alb_readings readings = {0};
+        glow_paint(picture, light, pitch, middle + off_mm[k], middle);
+        glow_expose(picture, 0.002, 3);
+        const alb_channel channel = glow_channel(picture);
+        check_ok(alb_observe(&readings, &channel, &error), &error);
+        check_ok(alb_rings_sort(&about_middle, &channel, NULL, middle, middle, pitch, &error), &error);
+        for (int i = 9; i <= 10; i++) { // 0.5 mm is 10 pixels
+            double truth = 0, wrong = 0, wrong_truth = 0;
+            for (int s = 0; s < ALB_RING_SAMPLES; s++)
+                truth += readings.sample_share[i][s] * glow_at(light->lit, readings.sample_r_mm[i][s]);
+            for (size_t p = about_middle.begin[i]; p < about_middle.begin[i + 1]; p++) {
+                wrong += about_middle.pixels[p].value;
+                wrong_truth += glow_at(light->lit, about_middle.pixels[p].r_mm);
+            }
+            print_message("%.1f mm off: ring at %.2f mm %+.2f %%; about the middle %+.1f %%\n", off_mm[k],
+                          readings.r_mm[i], 100 * (readings.value[i] / truth - 1), 100 * (wrong / wrong_truth - 1));
+            check_relative(readings.value[i], truth, 0.005); // pixels of a tenth of the distance bend 0.2 %
+        }
+        alb_rings_free(&about_middle);
+        alb_readings_free(&readings);
+    }
+}
+
+// The fast term under a clipped core is neither invented nor lost: what is measured stays, and the total keeps its
+// word.
+static void fast_term_under_a_clipped_core(void **state)
+{
+    (void)state;
+    static const double clipped_px[] = {1, 3, 6, 10};
+    const glow_spot kind = {false, 0.25};
+    const double pitch = 0.08, x = 8.03, y = 7.98;
+    glow_make(light, 0, kind);
+    glow_paint(picture, light, pitch, x, y);
+    for (int k = 0; k < 4; k++) {
+        alb_error error = {0};
+        alb_fitting *fitting = calloc(1, sizeof *fitting);
+        glow_expose(picture, 0.01, 5);
+        for (int i = 0; i < GLOW_SIZE * GLOW_SIZE; i++)
+            if (hypot(picture->face.x_mm[i] - x, picture->face.y_mm[i] - y) < clipped_px[k] * pitch)
+                picture->value[i] = NAN;
+        fitting->material.channels = 1;
+        see(&fitting->sides[0][0].readings, &fitting->sides[0][0].forward, kind, pitch, true);
+        check_ok(alb_fitting_run(fitting, &error), &error);
+        const alb_fitted *fitted = &fitting->sides[0][0].outcome.fitted;
+        double worst = 0;
+        for (double r = fmax(0.4, (clipped_px[k] + 1) * pitch); r < 5; r *= 1.1)
+            worst = fmax(worst, fabs(alb_profile_value(&fitted->profile, r) / glow_at(light->pencil, r) - 1));
+        print_message(
+            "clipped out to %2.0f px: %s, total %+.2f %% +- %.2f %%, S where measured %.1f %% off at worst, %s\n",
+            clipped_px[k], alb_form_name(fitted->profile.form), 100 * (fitted->total / light->total - 1),
+            100 * fitted->total_sd / fitted->total, 100 * worst, fitted->identifiable ? "identifiable" : "not decided");
+        check_below(worst, 0.06); // of a form that is right to some per cent
+        if (fitted->identifiable)
+            check_near(fitted->total, light->total, 4 * fitted->total_sd);
+        alb_fitting_free(fitting);
+        free(fitting);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(wide_spot), cmocka_unit_test(fit_under_a_wide_spot),
-                                       cmocka_unit_test(coarse_pixel), cmocka_unit_test(saturated_core)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(wide_spot),    cmocka_unit_test(fit_under_a_wide_spot),
+        cmocka_unit_test(coarse_pixel), cmocka_unit_test(saturated_core),
+        cmocka_unit_test(off_centre),   cmocka_unit_test(fast_term_under_a_clipped_core)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
