@@ -26,6 +26,7 @@ static const char style[] =
     "table{border-collapse:collapse;margin:.8rem 0;font-size:.92rem;font-variant-numeric:tabular-nums}\n"
     "th,td{padding:.3rem .9rem .3rem 0;text-align:left;border-bottom:1px solid var(--line);white-space:nowrap}\n"
     "th{font-weight:600;color:var(--quiet)}\n"
+    "td.t:last-child:not(:first-child){white-space:normal;min-width:18rem}\n"
     ".n{text-align:right;padding:.3rem .9rem .3rem .6rem}\n"
     "tbody tr:hover{background:var(--soft)}\n"
     ".pictures{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(20rem,100%),1fr));gap:1.25rem;"

@@ -20,12 +20,6 @@
 enum { QUANTILES = 180, STEPS = 80 };
 static const double index_where_unknown = 1.5;
 
-double alb_burley_value(alb_burley burley, double r_mm)
-{
-    const double d = burley.length_mm;
-    return burley.albedo * (exp(-r_mm / d) + exp(-r_mm / (3 * d))) / (8 * M_PI * d * r_mm);
-}
-
 double alb_burley_beam_ratio(double albedo)
 {
     const double x = fabs(albedo - 0.8);
@@ -77,6 +71,11 @@ double alb_albedo_invert(double total, double refractive_index)
     return invert(dipole_total, refractive_index, total);
 }
 
+static bool is_dipole(const alb_profile *profile)
+{
+    return profile->form == ALB_FORM_DIPOLE || profile->form == ALB_FORM_BETTER_DIPOLE;
+}
+
 // Distances within which 5 to 95 % of the light of the profile leaves, evenly spaced in light.
 static void light_quantiles(double r_mm[QUANTILES], const alb_profile *profile)
 {
@@ -103,9 +102,10 @@ static double mean_square_deviation(double *largest, alb_burley burley, const al
                                     const double r_mm[QUANTILES])
 {
     double sum = 0;
+    const alb_profile approximation = {ALB_FORM_BURLEY, {burley.albedo, burley.length_mm}};
     *largest = 0;
     for (int i = 0; i < QUANTILES; i++) {
-        const double x = log(alb_burley_value(burley, r_mm[i]) / alb_profile_value(profile, r_mm[i]));
+        const double x = log(alb_profile_value(&approximation, r_mm[i]) / alb_profile_value(profile, r_mm[i]));
         sum += x * x;
         *largest = fmax(*largest, fabs(x));
     }
@@ -150,7 +150,7 @@ static void take_medium(alb_appearance_channel *out, const alb_profile *profile,
         out->reduced_scattering_per_mm = measured->reduced_scattering_per_mm;
         return;
     }
-    if (profile->form == ALB_FORM_DIPOLE) {
+    if (is_dipole(profile)) {
         out->medium_source = ALB_MEDIUM_MEASURED;
         out->absorption_per_mm = profile->parameters[0];
         out->reduced_scattering_per_mm = profile->parameters[1];
@@ -168,7 +168,7 @@ bool alb_appearance_derive(alb_appearance *appearance, const alb_material *mater
     *appearance = (alb_appearance){
         .material = material, .refractive_index = material->refractive_index, .channels = material->channels};
     for (int c = 0; c < material->channels; c++)
-        if (material->fitted[ALB_REFLECTION][c].profile.form == ALB_FORM_DIPOLE)
+        if (is_dipole(&material->fitted[ALB_REFLECTION][c].profile))
             appearance->refractive_index = material->fitted[ALB_REFLECTION][c].profile.parameters[2];
     if (!(appearance->refractive_index > 0)) {
         appearance->refractive_index = index_where_unknown;
@@ -181,7 +181,7 @@ bool alb_appearance_derive(alb_appearance *appearance, const alb_material *mater
             return alb_fail(error, ALB_BAD_DATA,
                             "%s: channel %s has no reflection, which a renderer wants; csv takes either side",
                             material->name, material->channel_names[c]);
-        const bool black = reflection->profile.form == ALB_FORM_DIPOLE && reflection->profile.parameters[0] > 0;
+        const bool black = is_dipole(&reflection->profile) && reflection->profile.parameters[0] > 0;
         if (!(black || reflection->total > 0) || !(reflection->total <= 1 + 1e-9))
             return alb_fail(error, ALB_BAD_DATA,
                             "%s: channel %s reflects %.4g of the light, which no renderer takes: fit a calibrated "

@@ -8,13 +8,12 @@ typedef struct alb_burley {
     double albedo, length_mm; // A, d
 } alb_burley;
 
-double alb_burley_value(alb_burley burley, double r_mm); // 1/mm^2, r > 0
 // Mean free path over d: for light that enters as a beam, and for light that enters from everywhere.
 double alb_burley_beam_ratio(double albedo);
 double alb_burley_diffuse_ratio(double albedo);
 
 typedef enum alb_medium_source {
-    ALB_MEDIUM_MEASURED, // the material holds absorption and scattering: measured, or those of its dipole
+    ALB_MEDIUM_MEASURED, // of the material: from its totals by radiative transfer, or its dipole's
     ALB_MEDIUM_INVERTED  // from the albedo and the length of Burley's profile
 } alb_medium_source;
 

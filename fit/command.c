@@ -104,11 +104,10 @@ static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
            fitting->material.channel_names[c], alb_form_name(fitted->profile.form), fitted->total, fitted->total_sd,
            fitted->chi_square, fitted->degrees_of_freedom, 100 * outcome->rms_relative,
            fitted->identifiable ? "" : "  NOT DECIDED");
-    printf("%16s", "");
     for (int p = 0; p < alb_form_parameter_count(fitted->profile.form); p++)
-        printf("%s%c%d %.4g +- %.2g", p ? "  " : "", p % 2 ? 'b' : 'a', p / 2 + 1, fitted->profile.parameters[p],
-               fitted->sd[p]);
-    printf("\n%16sd ln S / dr %.5g +- %.2g per mm from %.4g to %.4g mm\n", "", outcome->slope_per_mm, outcome->slope_sd,
+        printf("%16s%-22s %.5g +- %.2g\n", "", alb_form_parameter_name(fitted->profile.form, p),
+               fitted->profile.parameters[p], fitted->sd[p]);
+    printf("%16sd ln S / dr %.5g +- %.2g per mm from %.4g to %.4g mm\n", "", outcome->slope_per_mm, outcome->slope_sd,
            outcome->slope_from_mm, outcome->slope_to_mm);
 }
 
@@ -168,6 +167,14 @@ static void examine(alb_fitting *fitting, bool absolute, alb_text *notes, alb_er
                              "measured energy is kept.\n",
                              alb_side_names[side], material->channel_names[c],
                              alb_form_name(outcome->fitted.profile.form), 100 * outcome->discrepancy_relative);
+            if (outcome->offset_sd > 0)
+                alb_text_add(notes,
+                             "%s %s: a constant of %.4g +- %.2g was in all readings (stray light, or the "
+                             "background) and is taken off.\n",
+                             alb_side_names[side], material->channel_names[c], outcome->offset, outcome->offset_sd);
+            if (*outcome->offset_instead)
+                alb_text_add(notes, "%s %s: %s.\n", alb_side_names[side], material->channel_names[c],
+                             outcome->offset_instead);
             held |= outcome->fitted.total < outcome->free_total;
             if (outcome->fitted.total < outcome->free_total)
                 alb_text_add(notes,
@@ -228,7 +235,7 @@ static bool write_results(const alb_fitting *fitting, const alb_map *map, const 
     const char *said = notes->bytes ? notes->bytes : "";
     if (!alb_file_make_directory(r->out, error) ||
         !(map->columns ? alb_map_write(map, fitting, provenance, said, r->out, error)
-                       : alb_fitting_report(fitting, said, r->out, error)) ||
+                       : alb_fitting_report(fitting, provenance, said, r->out, error)) ||
         !alb_material_write(fitting, provenance, r->out, error))
         return false;
     if (r->as_json) {

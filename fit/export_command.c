@@ -78,6 +78,7 @@ static bool run(int argc, char **argv, alb_error *error)
     alb_export exported;
     alb_text text = {0};
     bool ok = alb_file_check_target(out, error) && alb_material_read(&material, path, error) &&
+
               alb_export_prepare(&exported, exporter, &material, path, unit_mm, error) &&
               alb_provenance_add(&provenance, path, error);
     if (ok) {

@@ -1,27 +1,11 @@
-// The fitted profiles as a table: channel,r_mm,reflection_per_mm2,sd,transmission_per_mm2,sd. Distances are 0 and 199
-// that rise by one factor from where 0.1 % of a channel's light has left to where 99.9 % have. The sd are those of the
-// parameters carried to first order, sd^2(S) = g' C g; empty cells were not measured, or are not decided.
+// The fitted profiles as a table: channel,r_mm,reflection_per_mm2,sd,transmission_per_mm2,sd. 200 distances rise by one
+// factor from where 0.1 % of a channel's light has left to where 99.9 % have. Empty cells were not measured, or are not
+// decided.
 #include "fit/export.h"
+#include "fit/uncertainty.h"
 #include <math.h>
 
 enum { ROWS = 200 };
-
-// Standard deviation of S(r); the derivatives are central differences, good to about 1e-9 of themselves.
-static double profile_sd(const alb_fitted *fitted, double r_mm)
-{
-    double gradient[ALB_PARAMETERS_MAX], variance = 0;
-    const int n = alb_form_parameter_count(fitted->profile.form);
-    for (int p = 0; p < n; p++) {
-        alb_profile low = fitted->profile, high = fitted->profile;
-        const double step = 1e-5 * fabs(fitted->profile.parameters[p]);
-        low.parameters[p] -= step, high.parameters[p] += step;
-        gradient[p] = step > 0 ? (alb_profile_value(&high, r_mm) - alb_profile_value(&low, r_mm)) / (2 * step) : 0;
-    }
-    for (int p = 0; p < n; p++)
-        for (int q = 0; q < n; q++)
-            variance += gradient[p] * fitted->covariance[p][q] * gradient[q];
-    return sqrt(fmax(variance, 0));
-}
 
 static double distance_of_share(const alb_profile *profile, double share)
 {
@@ -41,7 +25,7 @@ static void put_side(alb_text *text, const alb_fitted *fitted, double r_mm)
     else if (!fitted->identifiable)
         alb_text_add(text, ",%.9g,", alb_profile_value(&fitted->profile, r_mm));
     else
-        alb_text_add(text, ",%.9g,%.4g", alb_profile_value(&fitted->profile, r_mm), profile_sd(fitted, r_mm));
+        alb_text_add(text, ",%.9g,%.4g", alb_profile_value(&fitted->profile, r_mm), alb_profile_sd(fitted, r_mm));
 }
 
 void alb_export_put_csv(alb_text *text, const alb_export *exported)
@@ -57,7 +41,7 @@ void alb_export_put_csv(alb_text *text, const alb_export *exported)
                 to = fmax(to, distance_of_share(&material->fitted[side][c].profile, 0.999));
             }
         for (int i = 0; i < ROWS && to > 0; i++) {
-            const double r_mm = i ? from * pow(to / from, (i - 1.0) / (ROWS - 2)) : 0;
+            const double r_mm = from * pow(to / from, i / (ROWS - 1.0));
             alb_text_add(text, "%s,%.9g", material->channel_names[c], r_mm);
             for (int side = 0; side < ALB_SIDES; side++)
                 put_side(text, &material->fitted[side][c], r_mm);

@@ -99,9 +99,9 @@ static bool put_picture(alb_page *page, const alb_map *map, const double *values
 static void put_spread(alb_page *page, const char *side, const char *channel, const char *quantity,
                        const alb_spread *spread, double wanted)
 {
-    alb_page_row(page, "%s|%s|%s|%d|%.5g ± %.2g|%.2g|%.1f / %d|%.3g|%s", side, channel, quantity, spread->count,
-                 spread->mean, spread->mean_sd, spread->between, spread->chi_square,
-                 spread->count > 0 ? spread->count - 1 : 0, spread->tail, spread->tail < wanted ? "differs" : "alike");
+    alb_page_row(page, "%s|%s|%s|%s|%d|%.5g ± %.2g|%.2g|%.1f / %d|%.3g", side, channel, quantity,
+                 spread->tail < wanted ? "differs" : "alike", spread->count, spread->mean, spread->mean_sd,
+                 spread->between, spread->chi_square, spread->count > 0 ? spread->count - 1 : 0, spread->tail);
 }
 
 static bool put_layer(alb_page *page, const alb_map *map, const alb_material *material, int side, int c,
@@ -141,8 +141,7 @@ bool alb_map_report(const alb_map *map, const alb_material *material, const char
                            ? "The sample is not alike everywhere: its %d x %d spots differ by more than their noise."
                            : "The sample is alike everywhere: its %d x %d spots differ by no more than their noise.",
                        map->columns, map->rows);
-    alb_page_table(&page, "side|channel|quantity|spots|mean ± sd|sd between spots|chi-square / dof|"
-                          "probability if alike|verdict");
+    alb_page_table(&page, "side|channel|quantity|verdict|spots|mean ± sd|between spots|chi-square / dof|probability");
     for (int side = 0; side < ALB_SIDES; side++)
         for (int c = 0; c < material->channels && map->layers[side][c].spots; c++) {
             const alb_map_layer *layer = &map->layers[side][c];
@@ -152,10 +151,12 @@ bool alb_map_report(const alb_map *map, const alb_material *material, const char
                        &layer->half, map->tail_wanted);
         }
     alb_page_end_table(&page);
-    alb_page_paragraph(&page,
-                       "A quantity differs where the probability is below %.3g, 5 %% over all that are tested: of a "
-                       "hundred samples that are alike, five at most are called otherwise.",
-                       map->tail_wanted);
+    alb_page_paragraph(
+        &page,
+        "The sd between spots is what their own sd do not explain. Probability: of a chi-square as large "
+        "where all are alike; a quantity differs below %.3g, 5 %% over all that are tested, so that of "
+        "a hundred samples that are alike five at most are called otherwise.",
+        map->tail_wanted);
     alb_page_lines(&page, notes);
     alb_page_begin_pictures(&page);
     for (int side = 0; side < ALB_SIDES; side++)

@@ -214,6 +214,7 @@ static void take_mean(alb_outcome *mean, const alb_map_layer *layer, alb_common_
     fitted->chi_square = layer->total.chi_square;
     fitted->degrees_of_freedom = layer->total.count - 1;
     fitted->identifiable = true;
+    mean->free_total = fitted->total;
     for (int p = 0; p < n; p++) {
         const double value = fitted->profile.parameters[p], half = 1.96 * fitted->sd[p];
         mean->knowledge.parameters[p] =

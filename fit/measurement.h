@@ -30,5 +30,7 @@ void alb_material_put(alb_json *json, const alb_fitting *fitting);
 // folder/material.json
 bool alb_material_write(const alb_fitting *fitting, const alb_provenance *provenance, const char *folder,
                         alb_error *error);
-// folder/report/fit.csv, fit.svg and fit.html. `notes` are sentences for the page, separated by line breaks.
-bool alb_fitting_report(const alb_fitting *fitting, const char *notes, const char *folder, alb_error *error);
+// folder/report/fit.csv, fit.svg, fit.html and fit.json, which holds all that the page shows. `notes` are sentences for
+// the reader, separated by line breaks.
+bool alb_fitting_report(const alb_fitting *fitting, const alb_provenance *provenance, const char *notes,
+                        const char *folder, alb_error *error);

@@ -7,17 +7,28 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char method[] = "adding-doubling of the totals of both sides";
+static const char *method_of(const alb_properties *p)
+{
+    return p->half_space ? "adding-doubling of the reflection, as of a half-space"
+                         : "adding-doubling of the totals of both sides";
+}
+
+static bool measured(const alb_material *material, alb_side side, int c)
+{
+    return material->fitted[side][c].profile.form != ALB_FORM_NONE;
+}
 
 static bool decided(const alb_material *material, int c)
 {
-    return material->fitted[ALB_REFLECTION][c].identifiable && material->fitted[ALB_TRANSMISSION][c].identifiable;
+    return material->fitted[ALB_REFLECTION][c].identifiable &&
+           (!measured(material, ALB_TRANSMISSION, c) || material->fitted[ALB_TRANSMISSION][c].identifiable);
 }
 
 static alb_measured_totals totals_of(const alb_material *material, const alb_properties_basis *basis, int c)
 {
-    alb_measured_totals out = {.thickness_mm = material->thickness_mm};
-    for (int side = 0; side < ALB_SIDES; side++) {
+    const bool slab = measured(material, ALB_TRANSMISSION, c);
+    alb_measured_totals out = {.thickness_mm = slab ? material->thickness_mm : 0};
+    for (int side = 0; side < (slab ? 2 : 1); side++) {
         const alb_fitted *fitted = &material->fitted[side][c];
         const double common = basis->common_sd[side][c], own = fmin(common, basis->own_sd);
         const double shared = common * common - own * own, all = fitted->total_sd / fitted->total;
@@ -34,15 +45,15 @@ void alb_properties_find(alb_properties properties[3], const alb_material *mater
     const double n = material->refractive_index, assumed_g = basis->anisotropy, other_g = assumed_g < 0.5 ? 0.9 : 0;
     for (int c = 0; c < 3; c++)
         properties[c] = (alb_properties){.anisotropy = assumed_g, .other_anisotropy = other_g, .other = {NAN, NAN}};
-    if (!(material->thickness_mm > 0 && n >= 1))
+    if (!(n >= 1))
         return;
     alb_optical_model assumed, instead;
     alb_optical_model_create(&assumed, ALB_OPTICAL_STREAMS, n, assumed_g);
     alb_optical_model_create(&instead, ALB_OPTICAL_STREAMS, n, other_g);
     for (int c = 0; c < material->channels; c++) {
         alb_properties *out = &properties[c];
-        if (material->fitted[ALB_REFLECTION][c].profile.form == ALB_FORM_NONE ||
-            material->fitted[ALB_TRANSMISSION][c].profile.form == ALB_FORM_NONE)
+        out->half_space = !measured(material, ALB_TRANSMISSION, c);
+        if (!measured(material, ALB_REFLECTION, c) || !(out->half_space || material->thickness_mm > 0))
             continue;
         const alb_measured_totals totals = totals_of(material, basis, c);
         alb_error error = {0};
@@ -72,23 +83,30 @@ static void put_pair(alb_json *json, const char *key, const double anisotropy, c
     alb_json_end_object(json);
 }
 
+static void put_slab(alb_json *json, const alb_properties *p)
+{
+    const alb_optical *o = &p->optical;
+    alb_json_estimate(json, "absorption_per_mm", o->absorption_per_mm, o->absorption_sd);
+    alb_json_estimate(json, "reduced_scattering_per_mm", o->reduced_scattering_per_mm, o->reduced_scattering_sd);
+    alb_json_number(json, "correlation", o->correlation);
+    alb_json_numbers(json, "relative_change_by_scale", o->by_scale, 2);
+    alb_json_numbers(json, "relative_change_by_thickness", o->by_thickness, 2);
+    put_pair(json, "with_other_anisotropy", p->other_anisotropy, p->other);
+    put_pair(json, "by_diffusion", NAN, o->diffusion);
+}
+
 void alb_properties_put(alb_json *json, const alb_properties *p)
 {
     const alb_optical *o = &p->optical;
     if (!p->known && !*p->refused)
         return;
     alb_json_object(json, "optical_properties");
-    alb_json_string(json, "method", method);
+    alb_json_string(json, "method", method_of(p));
     if (p->known) {
         alb_json_number(json, "anisotropy_assumed", p->anisotropy);
-        alb_json_estimate(json, "absorption_per_mm", o->absorption_per_mm, o->absorption_sd);
-        alb_json_estimate(json, "reduced_scattering_per_mm", o->reduced_scattering_per_mm, o->reduced_scattering_sd);
-        alb_json_number(json, "correlation", o->correlation);
         alb_json_estimate(json, "reduced_albedo", o->reduced_albedo, o->reduced_albedo_sd);
-        alb_json_numbers(json, "relative_change_by_scale", o->by_scale, 2);
-        alb_json_numbers(json, "relative_change_by_thickness", o->by_thickness, 2);
-        put_pair(json, "with_other_anisotropy", p->other_anisotropy, p->other);
-        put_pair(json, "by_diffusion", NAN, o->diffusion);
+        if (!p->half_space)
+            put_slab(json, p);
         alb_json_list(json, "flags");
         for (int i = 0; i < ALB_OPTICAL_FLAGS; i++)
             if (o->flags >> i & 1)
@@ -107,6 +125,13 @@ void alb_properties_note(alb_text *notes, const char *channel, const alb_propert
         alb_text_add(notes, "%s: no optical properties: %s.\n", channel, p->refused);
     if (!p->known)
         return;
+    if (p->half_space) {
+        alb_text_add(notes,
+                     "%s: reduced albedo %.5g +- %.2g by radiative transfer from reflection alone, as if no light came "
+                     "through, anisotropy %g assumed; absorption and scattering themselves want both sides.\n",
+                     channel, o->reduced_albedo, o->reduced_albedo_sd, p->anisotropy);
+        return;
+    }
     alb_text_add(notes,
                  "%s: absorption %.4g +- %.2g, reduced scattering %.4g +- %.2g per mm by radiative transfer from the "
                  "totals, anisotropy %g assumed",
@@ -125,13 +150,21 @@ void alb_properties_note(alb_text *notes, const char *channel, const alb_propert
     alb_text_add(notes, ".\n");
 }
 
+static bool read_estimate(double *value, alb_node node, const char *key, alb_error *error)
+{
+    alb_node estimate;
+    double sd;
+    return alb_node_object(&estimate, node, key, error) && alb_node_allow(estimate, "value sd", error) &&
+           alb_node_number(value, estimate, "value", 0, 1e300, error) &&
+           alb_node_number(&sd, estimate, "sd", 0, 1e300, error);
+}
+
 bool alb_properties_read(alb_optical_estimate *out, alb_node channel, alb_error *error)
 {
     *out = (alb_optical_estimate){0};
-    static const char *const estimates[] = {"absorption_per_mm", "reduced_scattering_per_mm", "reduced_albedo"};
-    alb_node properties, estimate, flags;
+    alb_node properties, flags;
     const char *text;
-    double value, values[3];
+    double value, absorption, scattering;
     size_t count;
     if (!alb_node_has(channel, "optical_properties"))
         return true;
@@ -141,21 +174,23 @@ bool alb_properties_read(alb_optical_estimate *out, alb_node channel, alb_error 
     if (alb_node_has(properties, "refused"))
         return alb_node_allow(properties, "method refused", error) &&
                alb_node_text(&text, properties, "refused", error);
+    const bool slab = alb_node_has(properties, "absorption_per_mm");
     if (!alb_node_allow(properties,
-                        "method anisotropy_assumed absorption_per_mm reduced_scattering_per_mm correlation "
-                        "reduced_albedo relative_change_by_scale relative_change_by_thickness with_other_anisotropy "
-                        "by_diffusion flags",
+                        slab ? "method anisotropy_assumed reduced_albedo absorption_per_mm reduced_scattering_per_mm "
+                               "correlation relative_change_by_scale relative_change_by_thickness "
+                               "with_other_anisotropy by_diffusion flags"
+                             : "method anisotropy_assumed reduced_albedo flags",
                         error) ||
         !alb_node_number(&value, properties, "anisotropy_assumed", -1, 1, error) ||
-        !alb_node_number(&value, properties, "correlation", -1.001, 1.001, error) ||
+        !read_estimate(&value, properties, "reduced_albedo", error) ||
         !alb_node_list(&flags, &count, properties, "flags", error))
         return false;
-    for (int i = 0; i < 3; i++)
-        if (!alb_node_object(&estimate, properties, estimates[i], error) ||
-            !alb_node_allow(estimate, "value sd", error) ||
-            !alb_node_number(&values[i], estimate, "value", 0, 1e300, error) ||
-            !alb_node_number(&value, estimate, "sd", 0, 1e300, error))
-            return false;
-    *out = (alb_optical_estimate){true, values[0], values[1]};
+    if (!slab)
+        return true;
+    if (!read_estimate(&absorption, properties, "absorption_per_mm", error) ||
+        !read_estimate(&scattering, properties, "reduced_scattering_per_mm", error) ||
+        !alb_node_number(&value, properties, "correlation", -1.001, 1.001, error))
+        return false;
+    *out = (alb_optical_estimate){true, absorption, scattering};
     return true;
 }

@@ -7,6 +7,7 @@
 #include "fit/optical.h"
 
 typedef struct alb_properties {
+    bool half_space;     // transmission was not measured: the ratio alone
     bool known;          // false: not tried (refused empty), or refused
     alb_optical optical; // with the anisotropy that was assumed
     double anisotropy;
@@ -23,7 +24,8 @@ typedef struct alb_properties_basis {
     double own_sd;                  // the part of it that the other side does not share
 } alb_properties_basis;
 
-// Of the material's slab: both sides fitted, thickness and index known.
+// Of a slab: both sides fitted, thickness and index known; where reflection alone was fitted, of a half-space of the
+// index.
 void alb_properties_find(alb_properties properties[3], const alb_material *material, const alb_properties_basis *basis);
 
 // Writes "optical_properties" into an open object; nothing where it was not tried.

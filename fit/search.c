@@ -8,6 +8,7 @@
 // the linear approximation: too small where the decays come close (b2/b1 below about 1.5 at 1 % noise).
 #include "fit/search.h"
 #include "base/memory.h"
+#include "fit/gauss_newton.h"
 #include "fit/separable.h"
 #include "fit/solve.h"
 #include <assert.h>
@@ -105,8 +106,9 @@ static void bounds_of(double *lower, double *upper, alb_form form, const alb_wei
     }
 }
 
-bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate candidate, const alb_weighing *weighing,
-                       alb_error *error)
+// From the profile to the nearest minimum; `near`: it is next to it, and the last digits are wanted.
+static bool polish(alb_profile *profile, double *chi_square, bool near, alb_candidate candidate,
+                   const alb_weighing *weighing, alb_error *error)
 {
     search s = {.candidate = candidate};
     if (!alb_model_create(&s.model, weighing, error))
@@ -118,11 +120,19 @@ bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate c
     for (int p = 0; p < parameters; p++)
         u[p] = fmin(fmax(u[p], lower[p]), upper[p]);
     const alb_problem problem = {parameters, alb_weighing_rows(weighing), evaluate, &s, lower, upper};
-    const bool ok = alb_solve(u, chi_square, &problem, error);
+    bool full_rank;
+    const bool ok =
+        near ? alb_gauss_newton(u, chi_square, &full_rank, &problem, error) : alb_solve(u, chi_square, &problem, error);
     *profile = profile_of(chain, candidate, u);
     alb_profile_order(profile);
     alb_model_free(&s.model);
     return ok;
+}
+
+bool alb_search_polish(alb_profile *profile, double *chi_square, alb_candidate candidate, const alb_weighing *weighing,
+                       alb_error *error)
+{
+    return polish(profile, chi_square, false, candidate, weighing, error);
 }
 
 int alb_search_at_bound(const alb_profile *profile, alb_candidate candidate, const alb_weighing *weighing)
@@ -152,7 +162,7 @@ bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_candi
     if (!fit.found)
         return true;
     *profile = fit.profile;
-    return !basis->slope || alb_search_polish(profile, chi_square, candidate, weighing, error);
+    return polish(profile, chi_square, !basis->slope, candidate, weighing, error);
 }
 
 // Inverts a symmetric positive definite matrix of unit diagonal in place by Cholesky; false where a pivot, which is

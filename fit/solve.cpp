@@ -1,11 +1,14 @@
 // Translation to Ceres and back; nothing of the physics.
 extern "C" {
 #include "fit/solve.h"
+#include "fit/gauss_newton.h"
 }
+#include <algorithm>
 #include <ceres/ceres.h>
 #include <cmath>
 #include <exception>
 #include <new>
+#include <vector>
 
 namespace
 {
@@ -35,17 +38,19 @@ class Residuals final : public ceres::CostFunction
 };
 } // namespace
 
-extern "C" bool alb_solve(double *parameters, double *chi_square, const alb_problem *problem, alb_error *error)
-try {
+static void descend(double *parameters, double *chi_square, const alb_problem &problem, double trust_radius)
+{
     ceres::Problem ceres_problem;
-    ceres_problem.AddResidualBlock(new Residuals(*problem), nullptr, parameters);
-    for (int i = 0; i < problem->parameter_count; i++) {
-        ceres_problem.SetParameterLowerBound(parameters, i, problem->lower[i]);
-        ceres_problem.SetParameterUpperBound(parameters, i, problem->upper[i]);
+    ceres_problem.AddResidualBlock(new Residuals(problem), nullptr, parameters);
+    for (int i = 0; i < problem.parameter_count; i++) {
+        ceres_problem.SetParameterLowerBound(parameters, i, problem.lower[i]);
+        ceres_problem.SetParameterUpperBound(parameters, i, problem.upper[i]);
     }
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
-    options.max_num_iterations = 200;
+    options.max_num_iterations = 3000;
+    options.max_num_consecutive_invalid_steps = 100; // fewer are an error to Ceres, which it prints
+    options.initial_trust_region_radius = trust_radius;
     options.function_tolerance = 1e-14;
     options.parameter_tolerance = 1e-12;
     options.gradient_tolerance = 1e-14;
@@ -54,6 +59,26 @@ try {
     ceres::Solver::Summary summary;
     ceres::Solve(options, &ceres_problem, &summary);
     *chi_square = 2 * (summary.IsSolutionUsable() ? summary.final_cost : summary.initial_cost);
+}
+
+extern "C" bool alb_solve(double *parameters, double *chi_square, const alb_problem *problem, alb_error *error)
+try {
+    const double long_steps = 1e4, short_steps = 1e-4;
+    std::vector<double> again(parameters, parameters + problem->parameter_count);
+    bool full_rank;
+    double reached;
+    descend(parameters, chi_square, *problem, long_steps);
+    if (!alb_gauss_newton(parameters, chi_square, &full_rank, problem, error))
+        return false;
+    if (full_rank)
+        return true;
+    descend(again.data(), &reached, *problem, short_steps);
+    if (!alb_gauss_newton(again.data(), &reached, &full_rank, problem, error))
+        return false;
+    if (reached < *chi_square) {
+        std::copy(again.begin(), again.end(), parameters);
+        *chi_square = reached;
+    }
     return true;
 } catch (const std::bad_alloc &) {
     return alb_fail(error, ALB_NO_MEMORY, "out of memory while fitting");

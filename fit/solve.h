@@ -1,4 +1,6 @@
-// Bounded nonlinear least squares by Ceres (Levenberg-Marquardt, dense QR), behind a C face.
+// Bounded nonlinear least squares by Ceres (Levenberg-Marquardt, dense QR), behind a C face; the last digits by
+// Gauss-Newton steps (gauss_newton.h). Where a term has run off to where it no longer shows, so that the Jacobian has
+// lost its rank, once more from the start with short steps.
 #pragma once
 #include "base/error.h"
 

@@ -21,6 +21,7 @@ static int leave(void **state)
                                         "folder/report/fit.csv",
                                         "folder/report/fit.svg",
                                         "folder/report/fit.html",
+                                        "folder/report/fit.json",
                                         "folder/report",
                                         "folder"};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++)
@@ -48,7 +49,7 @@ static void fit_and_write(alb_fitting *fitting, alb_side side)
     alb_provenance provenance = {.command = "fit"};
     check_ok(alb_fitting_from_table(fitting, &provenance, table, side, &error), &error);
     check_ok(alb_material_write(fitting, &provenance, "folder", &error), &error);
-    check_ok(alb_fitting_report(fitting, "a note\nand one with <b> & |", "folder", &error), &error);
+    check_ok(alb_fitting_report(fitting, &provenance, "a note\nand one with <b> & |", "folder", &error), &error);
 }
 
 static void round_trip(void **state)

@@ -95,6 +95,31 @@ static bool round_trip(alb_optical_estimate *out, const alb_properties *p, alb_e
     return ok;
 }
 
+// Reflection alone: the ratio, and no other number.
+static void one_side_only(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_material material = marble(0.01);
+    const alb_medium deep = {0.0041, 2.62, 0, 1.5, 200};
+    double totals[2];
+    discrete_ordinates(totals, &deep);
+    material.fitted[0][0].total = totals[0];
+    material.fitted[1][0] = (alb_fitted){0};
+    const alb_properties_basis basis = {0};
+    alb_properties p[3];
+    alb_optical_estimate read;
+    alb_properties_find(p, &material, &basis);
+    assert_true(p[0].known && p[0].half_space);
+    check_relative(1 - p[0].optical.reduced_albedo, 0.0041 / 2.6241, 0.005);
+    check_ok(round_trip(&read, &p[0], &error), &error);
+    assert_false(read.known);
+    alb_text notes = {0};
+    alb_properties_note(&notes, "G", &p[0]);
+    assert_non_null(strstr(notes.bytes, "want both sides"));
+    alb_text_free(&notes);
+}
+
 static void written_and_read(void **state)
 {
     (void)state;
@@ -118,10 +143,9 @@ static void written_and_read(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(values_and_their_price),
-        cmocka_unit_test(shared_and_own_errors),
-        cmocka_unit_test(reasons_not_to),
-        cmocka_unit_test(written_and_read),
+        cmocka_unit_test(values_and_their_price), cmocka_unit_test(shared_and_own_errors),
+        cmocka_unit_test(reasons_not_to),         cmocka_unit_test(written_and_read),
+        cmocka_unit_test(one_side_only),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

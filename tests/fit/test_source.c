@@ -9,7 +9,7 @@
 
 enum { WIDTH = 150, HEIGHT = 120, LATTICE = 25 };
 
-static const alb_profile truth[ALB_SIDES] = {{ALB_FORM_TWO_EXPONENTIALS, {0.015, 0.6, 0.3, 3}},
+static const alb_profile truth[ALB_SIDES] = {{ALB_FORM_TWO_EXPONENTIALS, {0.01, 0.6, 0.2, 3}},
                                              {ALB_FORM_SIGNED_EXPONENTIALS, {0.03, 0.5, -0.02, 1.0}}};
 static const double spot_x = 0.3, spot_y = -0.2;
 static const char *const files[] = {"s/calibration/white_spot.exr",
