@@ -1,6 +1,7 @@
 // The simplest form that the noise does not reject, and what is known of it.
 #pragma once
 #include "fit/operator.h"
+#include "fit/sensitivity.h"
 #include "fit/uncertainty.h"
 
 enum { ALB_ATTEMPTS_MAX = 10, ALB_REASON_SIZE = 320 };
@@ -27,9 +28,12 @@ typedef struct alb_outcome {
     double measured_share;       // share of the total within the readings
     double slope_per_mm, slope_sd, slope_from_mm, slope_to_mm; // d ln S / dr over the outer half of the readings
     alb_knowledge knowledge;
-    double free_total;  // before the energy was held (energy.h)
-    double energy_rise; // of chi-square, to hold it; of all sides of the channel
-    char undecided[ALB_REASON_SIZE]; // why the data do not decide; empty where they do (fitted.identifiable)
+    alb_sensitivity sensitivity;           // of the total to the range of the readings
+    double offset, offset_sd;              // taken off all readings before (offset.h); sd 0: none was
+    char offset_instead[ALB_BECAUSE_SIZE]; // a constant would do as well; empty where not
+    double free_total;                     // before the energy was held (energy.h)
+    double energy_rise;                    // of chi-square, to hold it; of all sides of the channel
+    char undecided[ALB_REASON_SIZE];       // why the data do not decide; empty where they do (fitted.identifiable)
 } alb_outcome;
 
 // Relative standard deviations of what all readings share: the incident flux, a factor of all values; and the unit of

@@ -62,8 +62,9 @@ static bool side_create(side *s, alb_measurement *measurement, alb_error *error)
 static void scale_to(alb_profile *profile, double total)
 {
     const double factor = total / alb_profile_total(profile) * (1 - 1e-12);
-    for (int p = 0; p < alb_form_parameter_count(profile->form); p += 2)
-        profile->parameters[p] *= factor;
+    for (int p = 0; p < alb_form_parameter_count(profile->form); p++)
+        if (alb_form_parameter(profile->form, p)->flux)
+            profile->parameters[p] *= factor;
 }
 
 // How much chi-square rises where the total is at most `total`; the profile goes to s->held.

@@ -1,6 +1,7 @@
 // material.json: written by fit, read strictly by render.
 #include "base/record.h"
 #include "fit/energy.h"
+#include "fit/offset.h"
 #include "fit/profile.h"
 #include "fit/search.h"
 #include <math.h>
@@ -28,8 +29,7 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
         alb_measurement *measurement = &fitting->sides[i / 3][i % 3];
         if (!measurement->forward.grid_mm)
             continue;
-        measurement->measured = alb_choose(&measurement->outcome, &measurement->readings, &measurement->forward,
-                                           measurement->common, &reasons[i]);
+        measurement->measured = alb_offset_choose(measurement, &reasons[i]);
     }
     for (int i = 0; i < ALB_SIDES * 3; i++)
         if (reasons[i].status != ALB_OK)
@@ -120,6 +120,12 @@ static void put_outcome(alb_json *json, const char *side, const alb_outcome *out
     alb_json_end_list(json);
     alb_json_number(json, "condition", outcome->knowledge.condition);
     put_known(json, "total", fitted->total, fitted->total_sd, &outcome->knowledge.total, false);
+    alb_json_number(json, "total_without_inner_fifth", outcome->sensitivity.without_inner);
+    alb_json_number(json, "total_without_outer_fifth", outcome->sensitivity.without_outer);
+    if (outcome->offset_sd > 0)
+        alb_json_estimate(json, "offset_per_mm2", outcome->offset, outcome->offset_sd);
+    if (*outcome->offset_instead)
+        alb_json_string(json, "offset_instead", outcome->offset_instead);
     if (fitted->total < outcome->free_total) {
         alb_json_object(json, "energy_held");
         alb_json_number(json, "free_total", outcome->free_total);
@@ -225,12 +231,12 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
     const char *form;
     long freedom;
     alb_node total;
-    if (!alb_node_allow(
-            node,
-            "form decay_ratio_held identifiable best_guess undecided parameters covariance condition total energy_held "
-            "chi_square degrees_of_freedom "
-            "errors_from discrepancy_relative rms_relative measured_share_of_total tail_slope_per_mm tried",
-            error) ||
+    if (!alb_node_allow(node,
+                        "form decay_ratio_held identifiable best_guess undecided parameters covariance condition total "
+                        "total_without_inner_fifth total_without_outer_fifth offset_per_mm2 offset_instead energy_held "
+                        "chi_square degrees_of_freedom errors_from discrepancy_relative rms_relative "
+                        "measured_share_of_total tail_slope_per_mm tried",
+                        error) ||
         !alb_node_text(&form, node, "form", error))
         return false;
     if (!alb_form_from_name(&fitted->profile.form, form))

@@ -26,6 +26,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const double measured_share_wanted = 0.5, bound_limit = 0.5, rise_95 = 3.841459, quantile_95 = 1.959964;
 
@@ -141,14 +142,14 @@ static int first_unidentified(const alb_knowledge *knowledge, int n)
 
 // The bound by the noise alone, of the parameters and of the total.
 static bool find_noise_bound(alb_knowledge *knowledge, const alb_profile *profile, alb_candidate candidate,
-                             const alb_weighing *weighing, alb_error *error)
+                             const alb_weighing *weighing, bool with_offset, alb_error *error)
 {
     const alb_weighing noise = {weighing->readings, weighing->forward, weighing->readings->sd, 0};
     const int n = alb_candidate_parameters(candidate);
     double covariance[ALB_PARAMETERS_MAX + 1][ALB_PARAMETERS_MAX + 1], gradient[ALB_PARAMETERS_MAX], condition;
     double variance = 0;
     alb_likelihood likelihood;
-    if (!alb_likelihood_create(&likelihood, profile, candidate, &noise, false, error))
+    if (!alb_likelihood_create(&likelihood, profile, candidate, &noise, with_offset, error))
         return false;
     const bool known = alb_likelihood_bound(covariance, &condition, &likelihood, profile);
     alb_likelihood_free(&likelihood);
@@ -168,7 +169,7 @@ static bool find_noise_bound(alb_knowledge *knowledge, const alb_profile *profil
 }
 
 bool alb_knowledge_find(alb_knowledge *knowledge, const alb_profile *profile, alb_candidate candidate,
-                        const alb_weighing *weighing, alb_error *error)
+                        const alb_weighing *weighing, bool with_offset, alb_error *error)
 {
     const int n = alb_candidate_parameters(candidate);
     alb_likelihood likelihood;
@@ -177,12 +178,12 @@ bool alb_knowledge_find(alb_knowledge *knowledge, const alb_profile *profile, al
         return true;
     for (int p = 0; p < ALB_PARAMETERS_MAX; p++)
         knowledge->parameters[p].because[0] = '\0';
-    if (!alb_likelihood_create(&likelihood, profile, candidate, weighing, false, error))
+    if (!alb_likelihood_create(&likelihood, profile, candidate, weighing, with_offset, error))
         return false;
     find_certainties(knowledge, &likelihood, n, false);
     find_interval(&knowledge->total, &likelihood, (alb_quantity){ALB_QUANTITY_TOTAL, 0, 0}, NULL);
     alb_likelihood_free(&likelihood);
-    if (!find_noise_bound(knowledge, profile, candidate, weighing, error))
+    if (!find_noise_bound(knowledge, profile, candidate, weighing, with_offset, error))
         return false;
     if (candidate.tied)
         copy_tied(knowledge);
@@ -311,6 +312,28 @@ bool alb_outcome_describe_fit(alb_outcome *outcome, const alb_readings *readings
     return true;
 }
 
+// Where a constant is fitted too: its sd enters that of the parameters.
+static bool find_covariance_beside_offset(double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX], bool *full_rank,
+                                          const alb_profile *profile, alb_candidate candidate,
+                                          const alb_weighing *weighing, alb_error *error)
+{
+    const int all = alb_form_parameter_count(profile->form), n = alb_candidate_parameters(candidate);
+    double relative[ALB_PARAMETERS_MAX + 1][ALB_PARAMETERS_MAX + 1], condition;
+    alb_likelihood likelihood;
+    memset(covariance, 0, sizeof(double[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX]));
+    *full_rank = !vanishes(profile);
+    if (!*full_rank)
+        return true;
+    if (!alb_likelihood_create(&likelihood, profile, candidate, weighing, true, error))
+        return false;
+    *full_rank = alb_likelihood_bound(relative, &condition, &likelihood, profile);
+    alb_likelihood_free(&likelihood);
+    for (int p = 0; *full_rank && p < all; p++)
+        for (int q = 0; q < all; q++) // a tied decay goes with the first
+            covariance[p][q] = profile->parameters[p] * profile->parameters[q] * relative[p < n ? p : 1][q < n ? q : 1];
+    return true;
+}
+
 bool alb_outcome_complete(alb_outcome *outcome, alb_candidate candidate, const alb_weighing *weighing, double energy_sd,
                           alb_common_sd common, alb_error *error)
 {
@@ -320,7 +343,10 @@ bool alb_outcome_complete(alb_outcome *outcome, alb_candidate candidate, const a
     const int n = alb_form_parameter_count(profile->form);
     bool full_rank;
     double gradient[ALB_PARAMETERS_MAX], beyond, core;
-    if (!alb_search_covariance(fitted->covariance, &full_rank, profile, candidate, weighing, error))
+    const bool with_offset = outcome->offset_sd > 0;
+    if (!(with_offset
+              ? find_covariance_beside_offset(fitted->covariance, &full_rank, profile, candidate, weighing, error)
+              : alb_search_covariance(fitted->covariance, &full_rank, profile, candidate, weighing, error)))
         return false;
     fitted->total = alb_profile_total_gradient(gradient, profile);
     outcome->free_total = fitted->total;
@@ -330,16 +356,18 @@ bool alb_outcome_complete(alb_outcome *outcome, alb_candidate candidate, const a
         extra = 0.25 * (beyond * beyond + core * core);
         variance = fmax(variance, energy_sd * energy_sd) + extra;
     }
-    if (!alb_knowledge_find(&outcome->knowledge, profile, candidate, weighing, error))
+    if (!alb_knowledge_find(&outcome->knowledge, profile, candidate, weighing, with_offset, error) ||
+        !alb_sensitivity_find(&outcome->sensitivity, profile, candidate, weighing, with_offset, error))
         return false;
     widen_intervals(outcome, n, common, sqrt(extra));
     alb_common_add(fitted, common);
     fitted->total_sd = sqrt(variance + fitted->total * fitted->total * common.flux * common.flux);
     for (int p = 0; p < n; p++)
         fitted->sd[p] = sqrt(fitted->covariance[p][p]);
-    fitted->degrees_of_freedom = readings->count - alb_candidate_parameters(candidate);
+    fitted->degrees_of_freedom = readings->count - alb_candidate_parameters(candidate) - with_offset;
     if (!alb_outcome_describe_fit(outcome, readings, weighing->forward, error))
         return false;
+    outcome->undecided[0] = '\0';
     judge(outcome, readings, full_rank);
     return true;
 }

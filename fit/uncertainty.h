@@ -21,15 +21,16 @@ typedef struct alb_knowledge {
     double condition; // of J^T J scaled to unit diagonal
 } alb_knowledge;
 
-// What the readings tell of each parameter. A parameter is identifiable where its Cramer-Rao bound is at most half of
-// itself not only at the fit, but at the ends of all the parameters' 99 % intervals too; see uncertainty.c.
+// What the readings tell of each parameter, beside a constant in all of them where one is fitted. A parameter is
+// identifiable where its Cramer-Rao bound is at most half of itself not only at the fit, but at the ends of all the
+// parameters' 99 % intervals too; see uncertainty.c.
 bool alb_knowledge_find(alb_knowledge *knowledge, const alb_profile *profile, alb_candidate candidate,
-                        const alb_weighing *weighing, alb_error *error);
+                        const alb_weighing *weighing, bool with_offset, alb_error *error);
 // Whether all parameters are; the reason where one is not. Less work where the bound at the fit says no.
 bool alb_identify(bool *identifiable, char because[ALB_BECAUSE_SIZE], const alb_profile *profile,
                   alb_candidate candidate, const alb_weighing *weighing, alb_error *error);
 
-// Fills the outcome, whose profile and discrepancy are set, with the rest. `weighing` is that of the last fit,
+// Fills the outcome, whose profile, discrepancy and offset are set, with the rest. `weighing` is that of the last fit,
 // energy_sd the sd of the measured energy. Fails only for want of memory.
 bool alb_outcome_complete(struct alb_outcome *outcome, alb_candidate candidate, const alb_weighing *weighing,
                           double energy_sd, struct alb_common_sd common, alb_error *error);
