@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static void find_properties(alb_fitting *fitting)
+void alb_fitting_find_properties(alb_fitting *fitting)
 {
     for (int i = 0; i < ALB_SIDES * 3; i++)
         fitting->basis.common_sd[i / 3][i % 3] = fitting->sides[i / 3][i % 3].common.flux;
@@ -60,7 +60,7 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
     for (int i = 0; i < ALB_SIDES * 3; i++)
         if (fitting->sides[i / 3][i % 3].measured)
             fitting->material.fitted[i / 3][i % 3] = fitting->sides[i / 3][i % 3].outcome.fitted;
-    find_properties(fitting);
+    alb_fitting_find_properties(fitting);
     find_images(fitting);
     return true;
 }
