@@ -3,12 +3,12 @@
 // Start: the brightest 5 x 5 pixels (by the lesser of mean and median: a glint is small; by the mean where that finds
 // none) that stand 8 sd above the median of the image, then the centroid of a window about them; unmeasured pixels
 // count as the brightest there, for they are the saturated core. Refined: Gauss-Newton on the image itself against its
-// own mean profile m(r) in rings of one pixel. A shift d of the centre changes a pixel at direction u by -m'(r) d.u, so
-// that d solves the normal equations of v - m(r) ~ -m'(r) d.u with weights 1 / variance of the ring: rings are made as
-// alike all around as they can be, without any form of profile, and pixels that were not measured do not pull. Glints
-// are looked for about the start and again about the centre found with them left out. The covariance is that of the
-// normal equations, times chi-square / freedom where that is above 1. Stops being true for profiles that are not round:
-// oblique beams (anisotropy.c says so), edges of the sample near the spot.
+// own mean profile m(r), a quadratic in every ring (ring.h). A shift d of the centre changes a pixel at direction u by
+// -m'(r) d.u, so that d solves the normal equations of v - m(r) ~ -m'(r) d.u with weights 1 / variance of the ring:
+// rings are made as alike all around as they can be, without any form of profile, and pixels that were not measured do
+// not pull. Glints are looked for about the start and again about the centre found with them left out. The covariance
+// is that of the normal equations, times chi-square / freedom where that is above 1. Stops being true for profiles that
+// are not round: oblique beams (anisotropy.c says so), edges of the sample near the spot.
 #include "fit/centre.h"
 #include "base/memory.h"
 #include "base/statistics.h"
@@ -17,7 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SMOOTH = 2, WINDOW = 10, BINS = 2048, ITERATIONS = 40, SAMPLES_MAX = 100000 };
+enum { SMOOTH = 2, WINDOW = 10, ITERATIONS = 40, DRIFT = 50, SAMPLES_MAX = 100000 };
 
 typedef struct level {
     double median, sd; // of the image; sd of one pixel in its dim parts
@@ -128,129 +128,113 @@ static void move_to_centroid(double *x, double *y, const alb_channel *channel, d
     }
 }
 
-typedef struct bin {
-    double count, sum, variance; // variance: summed over the pixels
-} bin;
+// The mean profile about a centre: the trends of its rings.
+typedef struct mean_profile {
+    alb_rings sorted;
+    alb_trend trends[ALB_RINGS_MAX];
+    int used; // rings out to where less than a fiftieth of the highest is left
+} mean_profile;
 
-// Mean profile in rings one pixel wide about (x, y); returns how many of them stand above a fiftieth of the highest.
-static int profile_about(bin bins[BINS], const alb_channel *channel, const bool *glint, double x_mm, double y_mm,
-                         double pitch_mm, double background)
+static bool profile_about(mean_profile *out, const alb_channel *channel, const bool *glint, const alb_centre *centre,
+                          double background, alb_error *error)
 {
-    const size_t count = (size_t)channel->face->width * (size_t)channel->face->height;
-    for (int k = 0; k < BINS; k++)
-        bins[k] = (bin){0};
-    for (size_t i = 0; i < count; i++) {
-        const double r = hypot(channel->face->x_mm[i] - x_mm, channel->face->y_mm[i] - y_mm) / pitch_mm;
-        const double value = channel->value[i];
-        if (!(r < BINS) || !isfinite(value) || glint[i])
-            continue;
-        bin *b = &bins[(int)r];
-        b->count++;
-        b->sum += value;
-        b->variance += channel->variance && isfinite(channel->variance[i]) ? channel->variance[i] : 0;
-    }
-    double top = background;
-    for (int k = 0; k < BINS; k++)
-        if (bins[k].count > 0)
-            top = fmax(top, bins[k].sum / bins[k].count);
-    int used = 0;
+    alb_rings *rings = &out->sorted;
+    double top = 0;
     bool inside = false;
-    for (int k = 0; k < BINS; k++, used = k) {
-        const bool high = bins[k].count > 0 && bins[k].sum / bins[k].count - background > 0.02 * (top - background);
-        if (inside && bins[k].count > 0 && !high && k >= 5)
+    if (!alb_rings_sort(rings, channel, glint, centre->x_mm, centre->y_mm, centre->pitch_mm, error))
+        return false;
+    for (int k = 0; k < ALB_RINGS_MAX; k++) {
+        const size_t begin = rings->begin[k], count = rings->begin[k + 1] - begin;
+        if (count)
+            out->trends[k] = alb_trend_fit(rings->pixels + begin, NULL, count, alb_ring_edge(k, rings->pitch_mm),
+                                           alb_ring_edge(k + 1, rings->pitch_mm));
+        if (count)
+            top = fmax(top, out->trends[k].mean - background);
+    }
+    for (out->used = 0; out->used < ALB_RINGS_MAX; out->used++) {
+        const int k = out->used;
+        const bool filled = rings->begin[k + 1] > rings->begin[k],
+                   high = filled && out->trends[k].mean - background > 0.02 * top;
+        if (inside && filled && !high && k >= 5)
             break;
         inside |= high;
     }
-    return used < BINS - 1 ? used : BINS - 2;
-}
-
-// A pixel against the mean profile, which is taken as straight between the middles of the rings.
-typedef struct comparison {
-    int bin;
-    double residual, slope_per_mm, cosine, sine;
-} comparison;
-
-static bool compare(comparison *out, const bin *bins, int used, const alb_channel *channel, const bool *glint, size_t i,
-                    double x_mm, double y_mm, double pitch_mm)
-{
-    const double x = channel->face->x_mm[i] - x_mm, y = channel->face->y_mm[i] - y_mm, r = hypot(x, y);
-    const double value = channel->value[i], t = fmax(r / pitch_mm - 0.5, 0);
-    if (!(r < used * pitch_mm) || !isfinite(value) || r == 0 || glint[i])
-        return false;
-    const int k = (int)t;
-    if (!(bins[k].count > 0 && bins[k + 1].count > 0))
-        return false;
-    const double low = bins[k].sum / bins[k].count, step = bins[k + 1].sum / bins[k + 1].count - low;
-    *out = (comparison){k, value - (low + (t - k) * step), step / pitch_mm, x / r, y / r};
     return true;
 }
 
-// Where the pixels have no variances: the scatter about the profile.
-static void scatter_about(bin bins[BINS], int used, const alb_channel *channel, const bool *glint, double x_mm,
-                          double y_mm, double pitch_mm)
+// Sums of one ring towards the normal equations.
+typedef struct equations {
+    double xx, xy, yy, hx, hy, squares, freedom;
+} equations;
+
+static equations of_ring(const alb_ring_pixel *pixels, size_t count, const alb_trend *trend, bool with_variance)
 {
-    const size_t count = (size_t)channel->face->width * (size_t)channel->face->height;
+    equations sum = {.freedom = (double)count - 3};
+    double variance = 0, squares = 0;
     for (size_t i = 0; i < count; i++) {
-        comparison c;
-        if (compare(&c, bins, used, channel, glint, i, x_mm, y_mm, pitch_mm))
-            bins[c.bin].variance += c.residual * c.residual;
+        const double r = pixels[i].r_mm, t = (r - trend->middle_mm) / trend->width_mm - trend->shift;
+        const double slope = (trend->linear + trend->bend * (2 * t - trend->skew)) / trend->width_mm;
+        const double residual = pixels[i].value - alb_trend_at(trend, r), cosine = r > 0 ? pixels[i].x_mm / r : 0,
+                     sine = r > 0 ? pixels[i].y_mm / r : 0;
+        const double gx = -slope * cosine, gy = -slope * sine;
+        sum.xx += gx * gx, sum.xy += gx * gy, sum.yy += gy * gy;
+        sum.hx += gx * residual, sum.hy += gy * residual;
+        squares += residual * residual;
+        variance += pixels[i].variance / (double)count;
     }
+    if (!with_variance)
+        variance = sum.freedom > 0 ? squares / sum.freedom : 0;
+    const double weight = 1 / (variance + 1e-12 * (trend->mean * trend->mean + trend->linear * trend->linear));
+    if (!(sum.freedom > 0 && isfinite(weight)))
+        return (equations){0};
+    return (equations){weight * sum.xx, weight * sum.xy,  weight * sum.yy, weight * sum.hx,
+                       weight * sum.hy, weight * squares, sum.freedom};
 }
 
 // One Gauss-Newton step and its covariance; false where the equations do not determine it.
-static bool shift_of(double shift_mm[2], double covariance_mm2[3], const bin *bins, int used,
-                     const alb_channel *channel, const bool *glint, double x_mm, double y_mm, double pitch_mm)
+static bool shift_of(double shift_mm[2], double covariance_mm2[3], const mean_profile *profile, bool with_variance)
 {
-    const size_t count = (size_t)channel->face->width * (size_t)channel->face->height;
-    double xx = 0, xy = 0, yy = 0, hx = 0, hy = 0, squares = 0, freedom = -used - 2;
-    for (size_t i = 0; i < count; i++) {
-        comparison c;
-        if (!compare(&c, bins, used, channel, glint, i, x_mm, y_mm, pitch_mm))
+    equations sum = {.freedom = -2};
+    for (int k = 0; k < profile->used; k++) {
+        const size_t begin = profile->sorted.begin[k], count = profile->sorted.begin[k + 1] - begin;
+        if (!count)
             continue;
-        const bin *b = &bins[c.bin];
-        const double low = b->sum / b->count, step = c.slope_per_mm * pitch_mm;
-        const double weight = 1 / (b->variance / b->count + 1e-12 * (low * low + step * step));
-        if (!(isfinite(weight) && weight > 0))
-            continue;
-        const double gx = -c.slope_per_mm * c.cosine, gy = -c.slope_per_mm * c.sine;
-        xx += weight * gx * gx, xy += weight * gx * gy, yy += weight * gy * gy;
-        hx += weight * gx * c.residual, hy += weight * gy * c.residual;
-        squares += weight * c.residual * c.residual;
-        freedom++;
+        const equations one = of_ring(profile->sorted.pixels + begin, count, &profile->trends[k], with_variance);
+        sum.xx += one.xx, sum.xy += one.xy, sum.yy += one.yy, sum.hx += one.hx, sum.hy += one.hy;
+        sum.squares += one.squares, sum.freedom += one.freedom;
     }
-    const double determinant = xx * yy - xy * xy, scale = freedom > 0 ? fmax(1, squares / freedom) : 1;
-    if (!(determinant > 1e-9 * xx * yy))
+    const double determinant = sum.xx * sum.yy - sum.xy * sum.xy,
+                 scale = sum.freedom > 0 ? fmax(1, sum.squares / sum.freedom) : 1;
+    if (!(determinant > 1e-9 * sum.xx * sum.yy))
         return false;
-    shift_mm[0] = (yy * hx - xy * hy) / determinant;
-    shift_mm[1] = (xx * hy - xy * hx) / determinant;
-    covariance_mm2[0] = scale * yy / determinant;
-    covariance_mm2[1] = -scale * xy / determinant;
-    covariance_mm2[2] = scale * xx / determinant;
+    shift_mm[0] = (sum.yy * sum.hx - sum.xy * sum.hy) / determinant;
+    shift_mm[1] = (sum.xx * sum.hy - sum.xy * sum.hx) / determinant;
+    covariance_mm2[0] = scale * sum.yy / determinant;
+    covariance_mm2[1] = -scale * sum.xy / determinant;
+    covariance_mm2[2] = scale * sum.xx / determinant;
     return true;
 }
 
 static bool refine(alb_centre *centre, const alb_channel *channel, const bool *glint, double background,
                    alb_error *error)
 {
-    bin *bins = alb_allocate(BINS, sizeof *bins, error);
-    if (!bins)
-        return false;
-    const double pitch = centre->pitch_mm;
-    for (int iteration = 0; iteration < ITERATIONS; iteration++) {
-        const int used = profile_about(bins, channel, glint, centre->x_mm, centre->y_mm, pitch, background);
-        double shift[2];
-        if (!channel->variance)
-            scatter_about(bins, used, channel, glint, centre->x_mm, centre->y_mm, pitch);
-        if (!shift_of(shift, centre->covariance_mm2, bins, used, channel, glint, centre->x_mm, centre->y_mm, pitch))
-            break;
-        const double length = hypot(shift[0], shift[1]), most = 3 * pitch, share = length > most ? most / length : 1;
-        centre->x_mm += share * shift[0];
-        centre->y_mm += share * shift[1];
-        if (length < 1e-4 * pitch)
+    mean_profile *profile = alb_allocate(1, sizeof *profile, error);
+    bool ok = profile != NULL;
+    for (int iteration = 0; ok && iteration < ITERATIONS; iteration++) {
+        double shift[2], length = 0;
+        ok = profile_about(profile, channel, glint, centre, background, error);
+        if (ok && shift_of(shift, centre->covariance_mm2, profile, channel->variance != NULL)) {
+            const double most = 3 * centre->pitch_mm;
+            length = hypot(shift[0], shift[1]);
+            centre->x_mm += fmin(most / length, 1) * shift[0];
+            centre->y_mm += fmin(most / length, 1) * shift[1];
+        }
+        alb_rings_free(&profile->sorted);
+        if (!(length > 1e-4 * centre->pitch_mm))
             break;
     }
-    free(bins);
-    return true;
+    free(profile);
+    return ok;
 }
 
 // From the start to the centre, glints left out.
@@ -268,6 +252,22 @@ static bool refine_without_glints(alb_centre *centre, bool *glint, bool leave_ou
             break;
     }
     return true;
+}
+
+// Whether the centre lies within DRIFT pixels of (x, y) and off the border of the image.
+static bool within_sight(const alb_face *face, const alb_centre *centre, int x, int y)
+{
+    double nearest = INFINITY;
+    int nearest_x = x, nearest_y = y;
+    for (int v = y > DRIFT ? y - DRIFT : 0; v <= y + DRIFT && v < face->height; v++)
+        for (int u = x > DRIFT ? x - DRIFT : 0; u <= x + DRIFT && u < face->width; u++) {
+            const size_t i = (size_t)v * (size_t)face->width + (size_t)u;
+            const double distance = hypot(face->x_mm[i] - centre->x_mm, face->y_mm[i] - centre->y_mm);
+            if (distance < nearest)
+                nearest = distance, nearest_x = u, nearest_y = v;
+        }
+    return nearest < 2 * centre->pitch_mm && nearest_x >= 2 && nearest_y >= 2 && nearest_x <= face->width - 3 &&
+           nearest_y <= face->height - 3;
 }
 
 bool alb_centre_find(alb_centre *centre, bool *glint, bool leave_out_glints, const alb_channel *channel,
@@ -308,8 +308,7 @@ bool alb_centre_find(alb_centre *centre, bool *glint, bool leave_out_glints, con
     *centre = (alb_centre){face->x_mm[i], face->y_mm[i], sqrt(face->area_mm2[i]), {0}};
     if (!refine_without_glints(centre, glint, leave_out_glints, channel, image.median, error))
         return false;
-    const double moved = hypot(centre->x_mm - face->x_mm[i], centre->y_mm - face->y_mm[i]);
-    if (!(moved < 50 * centre->pitch_mm))
+    if (!within_sight(face, centre, x, y))
         return alb_fail(error, ALB_BAD_DATA, "%s: no spot: it is not alike all around pixel (%d, %d)", channel->name, x,
                         y);
     return true;

@@ -9,7 +9,7 @@
 
 static const char usage[] =
     "usage: alabaster fit SESSION [--anisotropy G] [-o DIR] [--json]\n"
-    "       alabaster fit --image R.exr [--transmission T.exr] --mm-per-pixel S [--spot-radius-mm P] -o DIR [--json]\n"
+    "       alabaster fit --image R.exr [--transmission T.exr] --mm-per-pixel S [SPOT] [CURVED] -o DIR [--json]\n"
     "       alabaster fit --table PROFILE.csv --side reflection|transmission -o DIR [--json]\n"
     "\n"
     "Fits per channel and side the profile S(r), radiant exitance per incident flux, 1/mm^2, with the simplest\n"
@@ -20,8 +20,11 @@ static const char usage[] =
     "map.json, report/map.html, and the mean as material.json. It says whether the sample is alike everywhere.\n"
     "\n"
     "Images are looked at square on and hold radiant exitance per incident flux in 1/mm^2; in another unit the\n"
-    "amplitudes and totals are in that unit. Pixels are samples of S seen through a flat round spot of radius P\n"
-    "(0: a pencil beam).\n"
+    "amplitudes and totals are in that unit. Pixels average S, lit by SPOT, over squares. SPOT is --spot-radius-mm P\n"
+    "(a flat disc; 0, the default: a pencil beam), --spot-gaussian-mm W (irradiance falls to 1/e^2 at W) or\n"
+    "--spot-image WHITE.exr (its photograph on an opaque white face). CURVED is --curvature-radius-mm R (a sphere "
+    "that\n"
+    "bulges towards the camera) and --distance chord|arc: through the sample (default) or along its surface.\n"
     "A table has the columns r_mm,value_per_mm2 and optionally sd_per_mm2.\n"
     "\n"
     "Of a slab of known thickness and index seen from both sides it gives absorption and reduced scattering by\n"
@@ -31,22 +34,55 @@ static const char usage[] =
 
 typedef struct request {
     const char *session, *reflection, *transmission, *table, *side, *out;
-    double mm_per_pixel, spot_radius_mm, anisotropy;
+    alb_image_setting setting;
+    double anisotropy;
     bool as_json;
 } request;
 
-static bool check_request(request *r, const char *pixel, const char *radius, const char *anisotropy, alb_error *error)
+// What goes with images alone, as it was typed.
+typedef struct image_texts {
+    const char *pixel, *radius, *gaussian, *curvature, *distance;
+} image_texts;
+
+static bool check_images(request *r, const image_texts *t, alb_error *error)
+{
+    alb_image_setting *setting = &r->setting;
+    const char *extra = t->radius             ? "--spot-radius-mm"
+                        : t->gaussian         ? "--spot-gaussian-mm"
+                        : setting->spot_image ? "--spot-image"
+                        : t->curvature        ? "--curvature-radius-mm"
+                                              : NULL;
+    if (extra && !r->reflection && !r->transmission)
+        return alb_fail(error, ALB_USAGE, "%s goes with --image", extra);
+    if ((t->radius != NULL) + (t->gaussian != NULL) + (setting->spot_image != NULL) > 1)
+        return alb_fail(error, ALB_USAGE,
+                        "one of --spot-radius-mm, --spot-gaussian-mm and --spot-image says what lights");
+    if (t->distance && !t->curvature)
+        return alb_fail(error, ALB_USAGE, "--distance goes with --curvature-radius-mm");
+    if (t->distance && strcmp(t->distance, alb_distance_names[0]) != 0 &&
+        strcmp(t->distance, alb_distance_names[1]) != 0)
+        return alb_fail(error, ALB_USAGE, "--distance %.40s: chord or arc is wanted", t->distance);
+    setting->distance = t->distance && strcmp(t->distance, alb_distance_names[ALB_DISTANCE_ARC]) == 0
+                            ? ALB_DISTANCE_ARC
+                            : ALB_DISTANCE_CHORD;
+    return (!t->pixel || alb_option_number(&setting->mm_per_pixel, "--mm-per-pixel", t->pixel, 1e-9, 1e9, error)) &&
+           (!t->radius || alb_option_number(&setting->spot_radius_mm, "--spot-radius-mm", t->radius, 0, 1e9, error)) &&
+           (!t->gaussian ||
+            alb_option_number(&setting->spot_gaussian_mm, "--spot-gaussian-mm", t->gaussian, 1e-9, 1e9, error)) &&
+           (!t->curvature ||
+            alb_option_number(&setting->curvature_radius_mm, "--curvature-radius-mm", t->curvature, 1e-9, 1e9, error));
+}
+
+static bool check_request(request *r, const image_texts *texts, const char *anisotropy, alb_error *error)
 {
     const bool images = r->reflection || r->transmission;
     if ((r->session != NULL) + images + (r->table != NULL) != 1)
         return alb_fail(error, ALB_USAGE,
                         "one of SESSION, --image and --table is wanted; 'alabaster help fit' tells more");
-    if (images != (pixel != NULL))
+    if (images != (texts->pixel != NULL))
         return alb_fail(error, ALB_USAGE,
                         images ? "--image wants --mm-per-pixel: millimetres on the face between pixels"
                                : "--mm-per-pixel goes with --image");
-    if (radius && !images)
-        return alb_fail(error, ALB_USAGE, "--spot-radius-mm goes with --image");
     if (anisotropy && !r->session)
         return alb_fail(error, ALB_USAGE, "--anisotropy goes with SESSION");
     if ((r->table != NULL) != (r->side != NULL))
@@ -57,8 +93,7 @@ static bool check_request(request *r, const char *pixel, const char *radius, con
         return alb_fail(error, ALB_USAGE, "-o DIR is wanted: where material.json goes");
     if (!r->out)
         r->out = r->session;
-    return (!pixel || alb_option_number(&r->mm_per_pixel, "--mm-per-pixel", pixel, 1e-9, 1e9, error)) &&
-           (!radius || alb_option_number(&r->spot_radius_mm, "--spot-radius-mm", radius, 0, 1e9, error)) &&
+    return check_images(r, texts, error) &&
            (!anisotropy || alb_option_number(&r->anisotropy, "--anisotropy", anisotropy, -0.95, 0.95, error));
 }
 
@@ -174,11 +209,25 @@ static bool fit_request(alb_fitting *fitting, alb_map *map, alb_provenance *prov
             strcmp(r->side, alb_side_names[ALB_REFLECTION]) == 0 ? ALB_REFLECTION : ALB_TRANSMISSION, error);
     }
     const char *const paths[ALB_SIDES] = {r->reflection, r->transmission};
-    snprintf(provenance->options, sizeof provenance->options, "--mm-per-pixel %.9g --spot-radius-mm %.9g%s%s%s%s",
-             r->mm_per_pixel, r->spot_radius_mm, r->reflection ? " --image " : "",
-             r->reflection ? alb_path_name(r->reflection) : "", r->transmission ? " --transmission " : "",
-             r->transmission ? alb_path_name(r->transmission) : "");
-    return alb_fitting_from_images(fitting, provenance, notes, paths, r->mm_per_pixel, r->spot_radius_mm, error);
+    const alb_image_setting *setting = &r->setting;
+    alb_text options = {0};
+    alb_text_add(&options, "--mm-per-pixel %.9g", setting->mm_per_pixel);
+    if (setting->spot_image)
+        alb_text_add(&options, " --spot-image %s", alb_path_name(setting->spot_image));
+    else if (setting->spot_gaussian_mm > 0)
+        alb_text_add(&options, " --spot-gaussian-mm %.9g", setting->spot_gaussian_mm);
+    else
+        alb_text_add(&options, " --spot-radius-mm %.9g", setting->spot_radius_mm);
+    if (setting->curvature_radius_mm > 0)
+        alb_text_add(&options, " --curvature-radius-mm %.9g --distance %s", setting->curvature_radius_mm,
+                     alb_distance_names[setting->distance]);
+    for (int side = 0; side < ALB_SIDES; side++)
+        if (paths[side])
+            alb_text_add(&options, "%s%s", side == ALB_REFLECTION ? " --image " : " --transmission ",
+                         alb_path_name(paths[side]));
+    snprintf(provenance->options, sizeof provenance->options, "%s", options.bytes ? options.bytes : "");
+    alb_text_free(&options);
+    return alb_fitting_from_images(fitting, provenance, notes, paths, setting, error);
 }
 
 static bool write_results(const alb_fitting *fitting, const alb_map *map, const alb_provenance *provenance,
@@ -210,19 +259,24 @@ static bool write_results(const alb_fitting *fitting, const alb_map *map, const 
 static bool run(int argc, char **argv, alb_error *error)
 {
     request r = {0};
-    const char *pixel = NULL, *radius = NULL, *anisotropy = NULL;
+    image_texts texts = {0};
+    const char *anisotropy = NULL;
     const alb_option options[] = {{NULL, "SESSION", false, &r.session, NULL},
                                   {"--image", NULL, false, &r.reflection, NULL},
                                   {"--transmission", NULL, false, &r.transmission, NULL},
-                                  {"--mm-per-pixel", NULL, false, &pixel, NULL},
-                                  {"--spot-radius-mm", NULL, false, &radius, NULL},
+                                  {"--mm-per-pixel", NULL, false, &texts.pixel, NULL},
+                                  {"--spot-radius-mm", NULL, false, &texts.radius, NULL},
+                                  {"--spot-gaussian-mm", NULL, false, &texts.gaussian, NULL},
+                                  {"--spot-image", NULL, false, &r.setting.spot_image, NULL},
+                                  {"--curvature-radius-mm", NULL, false, &texts.curvature, NULL},
+                                  {"--distance", NULL, false, &texts.distance, NULL},
                                   {"--table", NULL, false, &r.table, NULL},
                                   {"--side", NULL, false, &r.side, NULL},
                                   {"--anisotropy", NULL, false, &anisotropy, NULL},
                                   {"-o", NULL, false, &r.out, NULL},
                                   {"--json", NULL, false, NULL, &r.as_json}};
     if (!alb_options_read(options, sizeof options / sizeof options[0], argc, argv, error) ||
-        !check_request(&r, pixel, radius, anisotropy, error))
+        !check_request(&r, &texts, anisotropy, error))
         return false;
     alb_provenance provenance = {.command = "fit"};
     alb_text notes = {0};

@@ -70,10 +70,15 @@ bool alb_observe_whole(alb_readings *readings, const alb_channel *channel, alb_e
 typedef struct alb_spot {
     int count;
     double *r_mm, *share;
+    double x_mm, y_mm; // centre of a measured one
 } alb_spot;
 
 // From an image of the spot on a white face: cut where it drowns in the noise, divided by its own sum.
 bool alb_spot_measure(alb_spot *spot, const alb_channel *white, alb_error *error);
 // Evenly lit disc; radius 0: a pencil beam.
 bool alb_spot_disc(alb_spot *spot, double radius_mm, alb_error *error);
+// Gaussian whose irradiance falls to 1/e^2 of its peak at radius_mm.
+bool alb_spot_gaussian(alb_spot *spot, double radius_mm, alb_error *error);
+// Spreads a stated spot over a square pixel, turned in all directions: what a camera of such pixels sees.
+bool alb_spot_see(alb_spot *spot, double pixel_mm, alb_error *error);
 void alb_spot_free(alb_spot *spot);

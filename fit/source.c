@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "calibrate/calibration.h"
 #include "fit/exit_angle.h"
+#include "fit/photo.h"
 #include "fit/product.h"
 #include "fit/table.h"
 #include <math.h>
@@ -46,60 +47,6 @@ bool alb_plane_take(alb_plane *out, const alb_image *image, const char *channel,
             out->variance[i] = f * f * (double)pixel[v];
     }
     return true;
-}
-
-// An image of a lit spot, and what its channels are read with. Errors call it `from`; notes, which end up in derived
-// files, do not.
-typedef struct photo {
-    const char *from;
-    alb_side side;
-    const alb_image *image;
-    const alb_face *face;
-    const alb_spot *spots[3];
-    const double *factor; // of each pixel; NULL: 1
-    double saturation;
-} photo;
-
-// Observes one channel and builds its forward model.
-static bool observe_channel(alb_fitting *fitting, const photo *seen, int channel, alb_text *notes, alb_error *error)
-{
-    char name[64], full_name[1024];
-    alb_plane pixels = {0};
-    const char *channel_name = fitting->material.channel_names[channel];
-    alb_measurement *measurement = &fitting->sides[seen->side][channel];
-    alb_readings *readings = &measurement->readings;
-    snprintf(name, sizeof name, "%s %s", alb_side_names[seen->side], channel_name);
-    snprintf(full_name, sizeof full_name, "%.900s: %s", seen->from, name);
-    bool ok = alb_plane_take(&pixels, seen->image, channel_name, seen->factor, seen->saturation, error);
-    const alb_channel observed = {seen->face, pixels.value, pixels.variance, full_name};
-    ok = ok && alb_observe(readings, &observed, error) &&
-         alb_operator_create(&measurement->forward, readings, seen->spots[channel], error);
-    alb_plane_free(&pixels);
-    if (ok && readings->core_mm > 0)
-        alb_text_add(notes,
-                     "%s: pixels out to %.4g mm of the centre are not measured (saturated); the core is the form's.\n",
-                     name, readings->core_mm);
-    return ok;
-}
-
-// All channels, each by a thread; notes and the first error in the order of the channels.
-static bool observe_channels(alb_fitting *fitting, const photo *seen, alb_text *notes, alb_error *error)
-{
-    alb_text own_notes[3] = {{0}};
-    alb_error reasons[3] = {{0}};
-    bool ok[3] = {true, true, true}, all = true;
-#pragma omp parallel for schedule(dynamic)
-    for (int c = 0; c < fitting->material.channels; c++)
-        ok[c] = observe_channel(fitting, seen, c, &own_notes[c], &reasons[c]);
-    for (int c = 0; c < 3; c++) {
-        if (all && own_notes[c].bytes)
-            alb_text_add(notes, "%s", own_notes[c].bytes);
-        notes->failed = notes->failed || own_notes[c].failed;
-        if (all && !ok[c])
-            all = alb_fail(error, reasons[c].status, "%s", reasons[c].text);
-        alb_text_free(&own_notes[c]);
-    }
-    return all;
 }
 
 bool alb_product_read(alb_image *image, alb_provenance *provenance, const alb_calibration *calibration,
@@ -220,14 +167,14 @@ static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provena
               alb_exitance_factor(&factor, notes, calibration, product->side, &face, error);
     if (ok) {
         const alb_spot *spots = white->spots;
-        const photo seen = {product->shot, product->side, &image, &face, {&spots[0], &spots[1], &spots[2]},
-                            factor,        INFINITY};
+        const alb_photo seen = {product->shot, product->side, &image, &face, {&spots[0], &spots[1], &spots[2]},
+                                factor,        INFINITY};
         for (int c = 0; c < calibration->channels; c++)
             fitting->sides[product->side][c].common =
                 (alb_common_sd){hypot(product->relative_scale_sd[c],
                                       calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0),
                                 calibration->views[product->side].relative_length_sd};
-        ok = observe_channels(fitting, &seen, notes, error);
+        ok = alb_photo_observe(fitting, &seen, notes, error);
     }
     free(factor);
     alb_face_free(&face);
@@ -274,81 +221,12 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_map *map, alb_provenance
         fitting->basis.own_sd = calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0;
         material->channels = calibration->channels;
         memcpy(material->channel_names, calibration->channel_names, sizeof material->channel_names);
-        ok = alb_map_is_wanted(calibration)
-                 ? alb_map_from_session(map, fitting, provenance, notes, calibration, error)
-                 : observe_products(fitting, provenance, notes, calibration, error) && alb_fitting_run(fitting, error);
+        if (alb_map_is_wanted(calibration))
+            ok = alb_map_from_session(map, fitting, provenance, notes, calibration, error);
+        else if ((ok = observe_products(fitting, provenance, notes, calibration, error) &&
+                       alb_fitting_run(fitting, error)))
+            alb_photo_note_border(notes, fitting);
     }
     free(calibration);
     return ok;
-}
-
-// The channels to fit of an image: those of R, G, B that are there, else Y.
-static bool take_channels(alb_material *material, const alb_image *image, const char *path, alb_error *error)
-{
-    static const char *const names[] = {"R", "G", "B", "Y"};
-    alb_material found = {0};
-    for (int i = 0; i < 4; i++)
-        if (alb_image_channel(image, names[i]) >= 0 && (i < 3 || found.channels == 0))
-            snprintf(found.channel_names[found.channels++], sizeof found.channel_names[0], "%s", names[i]);
-    if (found.channels == 0)
-        return alb_fail(error, ALB_BAD_DATA, "%s: none of the channels R, G, B, Y", path);
-    if (material->channels && (material->channels != found.channels ||
-                               memcmp(material->channel_names, found.channel_names, sizeof found.channel_names) != 0))
-        return alb_fail(error, ALB_BAD_DATA, "%s: other channels than the image of the other side", path);
-    material->channels = found.channels;
-    memcpy(material->channel_names, found.channel_names, sizeof found.channel_names);
-    return true;
-}
-
-static bool observe_image(alb_fitting *fitting, alb_text *notes, const char *path, alb_side side, double mm_per_pixel,
-                          const alb_spot *spot, alb_error *error)
-{
-    alb_image image = {0};
-    alb_face face = {0};
-    int bits = 0;
-    bool ok = alb_image_read(&image, &bits, path, error) && take_channels(&fitting->material, &image, path, error) &&
-              alb_face_flat(&face, image.width, image.height, mm_per_pixel, error);
-    const double saturation = bits == 8 ? 255 : bits == 16 ? 65535 : (double)INFINITY;
-    if (ok && bits)
-        alb_text_add(notes, "%s: %d-bit values are taken as linear; those at full scale as not measured.\n",
-                     alb_path_name(path), bits);
-    const photo seen = {path, side, &image, &face, {spot, spot, spot}, NULL, saturation};
-    ok = ok && observe_channels(fitting, &seen, notes, error);
-    alb_face_free(&face);
-    alb_image_free(&image);
-    return ok;
-}
-
-// "folder/wax.exr" names the material "wax".
-static void name_after(alb_material *material, const char *path)
-{
-    const char *name = alb_path_name(path), *dot = strrchr(name, '.');
-    const int length = dot && dot > name ? (int)(dot - name) : (int)strlen(name);
-    snprintf(material->name, sizeof material->name, "%.*s", length < ALB_NAME_SIZE ? length : ALB_NAME_SIZE - 1, name);
-}
-
-bool alb_fitting_from_images(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
-                             const char *const paths[ALB_SIDES], double mm_per_pixel, double spot_radius_mm,
-                             alb_error *error)
-{
-    alb_spot spot = {0};
-    bool ok = alb_spot_disc(&spot, spot_radius_mm, error);
-    name_after(&fitting->material, paths[ALB_REFLECTION] ? paths[ALB_REFLECTION] : paths[ALB_TRANSMISSION]);
-    for (int side = 0; ok && side < ALB_SIDES; side++)
-        ok = !paths[side] || (alb_provenance_add(provenance, paths[side], error) &&
-                              observe_image(fitting, notes, paths[side], (alb_side)side, mm_per_pixel, &spot, error));
-    alb_spot_free(&spot);
-    return ok && alb_fitting_run(fitting, error);
-}
-
-bool alb_fitting_from_table(alb_fitting *fitting, alb_provenance *provenance, const char *path, alb_side side,
-                            alb_error *error)
-{
-    alb_measurement *measurement = &fitting->sides[side][0];
-    name_after(&fitting->material, path);
-    fitting->material.channels = 1;
-    snprintf(fitting->material.channel_names[0], sizeof fitting->material.channel_names[0], "Y");
-    return alb_table_read(&measurement->readings, path, error) && alb_provenance_add(provenance, path, error) &&
-           alb_operator_identity(&measurement->forward, &measurement->readings, error) &&
-           alb_fitting_run(fitting, error);
 }

@@ -2,6 +2,7 @@
 // every side and channel it finds; adds what it read to the inputs, and sentences for the reader to the notes.
 #pragma once
 #include "base/text.h"
+#include "fit/curvature.h"
 #include "fit/map.h"
 #include "fit/measurement.h"
 
@@ -9,9 +10,19 @@
 // the mean of the spots.
 bool alb_fitting_from_session(alb_fitting *fitting, alb_map *map, alb_provenance *provenance, alb_text *notes,
                               const char *folder, alb_error *error);
-// paths[side] may be NULL, not both. spot_radius_mm 0: a pencil beam.
+
+// What is known of images by hand. The light: a spot measured on an opaque white face, or a Gaussian, or an even disc.
+typedef struct alb_image_setting {
+    double mm_per_pixel;
+    double spot_radius_mm;      // of a disc; 0: a pencil beam
+    double spot_gaussian_mm;    // where irradiance has fallen to 1/e^2; 0: a disc
+    const char *spot_image;     // in the same pixels as the images; NULL: as stated
+    double curvature_radius_mm; // of a sphere that bulges towards the camera at the spot; 0: flat
+    alb_distance distance;      // on it
+} alb_image_setting;
+
+// paths[side] may be NULL, not both.
 bool alb_fitting_from_images(alb_fitting *fitting, alb_provenance *provenance, alb_text *notes,
-                             const char *const paths[ALB_SIDES], double mm_per_pixel, double spot_radius_mm,
-                             alb_error *error);
+                             const char *const paths[ALB_SIDES], const alb_image_setting *setting, alb_error *error);
 bool alb_fitting_from_table(alb_fitting *fitting, alb_provenance *provenance, const char *path, alb_side side,
                             alb_error *error);

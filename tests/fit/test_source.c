@@ -166,7 +166,9 @@ static void images_by_hand(void **state)
     alb_text notes = {0};
     alb_fitting *fitting = calloc(1, sizeof *fitting);
     const char *const paths[ALB_SIDES] = {"image.exr", NULL};
-    check_ok(alb_fitting_from_images(fitting, &provenance, &notes, paths, mm_per_pixel, 0, &error), &error);
+    check_ok(alb_fitting_from_images(fitting, &provenance, &notes, paths,
+                                     &(alb_image_setting){.mm_per_pixel = mm_per_pixel}, &error),
+             &error);
     assert_int_equal(fitting->material.channels, 3);
     for (int c = 0; c < 3; c++) {
         const alb_fitted *fitted = &fitting->material.fitted[ALB_REFLECTION][c];
@@ -196,8 +198,9 @@ static void what_is_missing_is_named(void **state)
     check_fails(alb_fitting_from_session(fitting, &map, &provenance, &notes, "nowhere", &error), &error, ALB_ACCESS,
                 "nowhere");
     const char *const paths[ALB_SIDES] = {NULL, "nowhere.exr"};
-    check_fails(alb_fitting_from_images(fitting, &provenance, &notes, paths, 1, 0, &error), &error, ALB_ACCESS,
-                "nowhere.exr");
+    check_fails(
+        alb_fitting_from_images(fitting, &provenance, &notes, paths, &(alb_image_setting){.mm_per_pixel = 1}, &error),
+        &error, ALB_ACCESS, "nowhere.exr");
     alb_fitting_free(fitting);
     alb_text_free(&notes);
     free(fitting);
