@@ -10,8 +10,8 @@
 // 4. A second term that gains little has rivals: then also from b_0 and each peak of what a second column gains.
 //
 // 1 to 3 on readings of which neighbours are merged; what is left, one place mostly, is polished on all readings.
-// The best minimum in each of thousands of random profiles, noise 0.1 to 10 %, decays 1 : 1.1 to 10 (tests). Stops being
-// true where decays of the truth lie closer than the grid and the readings still tell them apart by more than two
+// The best minimum in each of thousands of random profiles, noise 0.1 to 10 %, decays 1 : 1.1 to 10 (tests). Stops
+// being true where decays of the truth lie closer than the grid and the readings still tell them apart by more than two
 // terms.
 #include "fit/separable.h"
 #include "fit/measure.h"
@@ -188,8 +188,10 @@ static void polish_second(alb_place *best, search *s, const alb_place *one, alb_
             (signs == ALB_POSITIVE || s->x[j] > x + log(ALB_TIED_RATIO)))
             keep(&from, (start){gain[j], {fmin(x, s->x[j]), fmax(x, s->x[j])}});
     }
-    keep(&from,
-         (start){0, {pivot - (signs == ALB_POSITIVE ? 0.2 : -0.05), pivot + (signs == ALB_POSITIVE ? 0.2 : 0.9)}});
+    if (signs == ALB_POSITIVE)
+        keep(&from, (start){0, {pivot - 0.2, pivot + 0.2}});
+    for (double apart = 0.7; signs != ALB_POSITIVE && apart < 2; apart += 0.6)
+        keep(&from, (start){0, {pivot + 0.02, pivot + apart}});
     for (int k = 0; k < from.count; k++)
         polish(best, s, from.list[k].x, 2, signs);
 }
