@@ -5,7 +5,8 @@
 // the spot: the share of its light within a small distance q of the ring, over pi q^2.
 //
 // It is looked for where no form stands, its parameters are not decided, or a term is narrower than the spot. It is
-// taken where the misfit falls to half at least or is none, what lies above has the shape of the spot (P >= 1e-3, with
+// taken where the misfit falls to half at least, or, where it was below 3 % (a fast term holds the spike), does not
+// grow by half; what lies above has the shape of the spot (P >= 1e-3, with
 // a tenth of what the form holds there and 5 % of u e_i allowed for), and u is 3 sd: of the noise where all forms
 // missed by more than 3 %, else also of that tenth (by which forms miss there: 2 to 12 % on slabs by Monte Carlo). The
 // tenth is in the sd of u and of the total. Stops being true where light that has scattered little is as narrow as the
@@ -140,9 +141,10 @@ bool alb_ballistic_find(alb_outcome *outcome, const alb_readings *readings, cons
     if (!find_straight(&light, other, readings, forward, irradiance, most, lit, error))
         goto done;
     ok = true;
-    const double sd = outcome->discrepancy_relative > misfit_of_a_spike ? light.sd : hypot(light.sd, light.unmeasured);
+    const bool missed = outcome->discrepancy_relative > misfit_of_a_spike;
+    const double sd = missed ? light.sd : hypot(light.sd, light.unmeasured);
     if (light.share > 3 * sd && light.like_spot &&
-        (other->discrepancy_relative == 0 || other->discrepancy_relative <= 0.5 * outcome->discrepancy_relative))
+        other->discrepancy_relative <= (missed ? 0.5 : 1.5) * outcome->discrepancy_relative)
         take(outcome, other, &light, beyond.core_mm, common);
 done:
     free(irradiance);
