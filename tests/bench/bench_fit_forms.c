@@ -123,7 +123,7 @@ int main(int argc, char **argv)
             tried *t = &all[side][f];
             const double rms = alb_median(t->rms, (size_t)t->count), total = alb_median(t->total, (size_t)t->count);
             const int last = t->count ? t->count - 1 : 0;
-            printf("%-13s %-20s%-6s %10d %4d/%-3d %12.2f %9.2f %13.2f %12.2f\n", alb_side_names[side],
+            printf("%-13s %-24s%-6s %6d %4d/%-3d %12.2f %9.2f %13.2f %12.2f\n", alb_side_names[side],
                    alb_form_name(candidates[f].form), candidates[f].tied ? " tied" : "",
                    alb_candidate_parameters(candidates[f]), t->count, t->slabs, rms, t->rms[last], total,
                    t->total[last]);
