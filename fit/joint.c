@@ -1,8 +1,9 @@
-// Weighted least squares on p = (ln sigma_a, ln sigma_s', ln c) of
-//     readings_i = c (W S(sigma_a, sigma_s'))_i,  W the readings' operator (operator.h), S by transport (slab.h),
-// with ln c known to the calibration's sd; by Gauss and Newton's steps, derivatives by central differences of a model
-// without noise. The inverse of J^T J is Cramer and Rao's bound and, times chi-square per degree of freedom where that
-// is above 1, the covariance.
+// Weighted least squares on p = (ln sigma_a, ln sigma_s', g, ln c, ln b) of
+//     readings_i = c (of transmission: c b) (W S(sigma_a, sigma_s'))_i,  W the readings' operator (operator.h), S by
+// transport (slab.h), with ln c and ln b known to the calibration's sds and g to the
+// caller's; by Gauss and Newton's steps, derivatives by
+// central differences of a model without noise. The inverse of J^T J is Cramer and Rao's bound and, times chi-square
+// per degree of freedom where that is above 1, the covariance.
 //
 // What is used: readings of which less than 2 % comes from within half a transport mean free path of the beam, where
 // the model is worse than elsewhere and where the light that has not scattered arrives. The model's accuracy is one sd
@@ -21,10 +22,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PARAMETERS = ALB_JOINT_PARAMETERS, GRID = 24, STEPS_MAX = 16 };
+enum {
+    PARAMETERS = ALB_JOINT_PARAMETERS,
+    PRIORS = PARAMETERS - ALB_JOINT_ANISOTROPY,
+    SLABS = 1 + 2 * ALB_JOINT_SCALE,
+    GRID = 24,
+    STEPS_MAX = 16
+};
 static const double near_mfp = 0.5, near_share = 0.02, accuracy = 1.5e-3, accuracy_span = 0.2, difference = 0.01,
                     settled = 1e-4;
-static const double reach[PARAMETERS] = {1.5, 0.4, 0.2}; // of one step
+static const double reach[PARAMETERS] = {1.5, 0.4, 0.2, 0.2, 0.2}; // of one step
+static const double most_anisotropy = 0.9;
 
 // One row: a reading, the face it is of, its row of the operator and the sd to weigh it with.
 typedef struct row {
@@ -36,42 +44,51 @@ typedef struct problem {
     const alb_joint_side *sides;
     const alb_joint_known *known;
     row *rows;
-    int count; // of rows; the scale's prior is one more residual
-    double end_mm, point[PARAMETERS];
+    int count; // of rows; what is known of g and the factors are PRIORS more residuals
+    double prior[PRIORS], prior_sd[PRIORS], end_mm, point[PARAMETERS];
     double (*on_grid)[ALB_OPERATOR_COLUMNS], (*columns[ALB_SIDES])[ALB_OPERATOR_COLUMNS];
 } problem;
 
-static alb_slab slab_at(const alb_joint_known *known, double ln_absorption, double ln_scattering)
+static alb_slab slab_at(const alb_joint_known *known, const double *parameters)
 {
-    return (alb_slab){exp(ln_absorption), exp(ln_scattering) / (1 - known->anisotropy), known->anisotropy,
-                      known->refractive_index, known->thickness_mm};
+    const double g = parameters[ALB_JOINT_ANISOTROPY];
+    return (alb_slab){exp(parameters[0]), exp(parameters[1]) / (1 - g), g, known->refractive_index,
+                      known->thickness_mm};
 }
 
-// Columns 0, 1, 2 of columns[side]: readings of S and its derivatives by ln sigma_a and ln sigma_s'.
+// Columns 0..3 of columns[side]: readings of S and its derivatives by ln sigma_a, ln sigma_s' and g, the last one 0
+// where g is known. Slab 1 + 2 i is a step up in parameter i from slab 0, slab 2 + 2 i one down.
 static bool evaluate_sides(problem *p, const double *parameters, alb_error *error)
 {
-    alb_slab_light light[5];
-    alb_error reasons[5] = {{0}};
+    alb_slab_light light[SLABS];
+    alb_error reasons[SLABS] = {{0}};
+    double places[SLABS][PARAMETERS];
+    const int slabs = p->known->anisotropy_sd > 0 ? SLABS : SLABS - 2;
     memcpy(p->point, parameters, sizeof p->point);
+    for (int i = 0; i < SLABS; i++) {
+        memcpy(places[i], parameters, sizeof places[i]);
+        if (i > 0)
+            places[i][(i - 1) / 2] += i % 2 ? difference : -difference;
+        places[i][ALB_JOINT_ANISOTROPY] = fmax(places[i][ALB_JOINT_ANISOTROPY], 0);
+    }
 #pragma omp parallel for schedule(dynamic)
-    for (int i = 0; i < 5; i++) {
-        const double step = i == 0 ? 0 : i % 2 ? difference : -difference;
-        const alb_slab slab =
-            slab_at(p->known, parameters[0] + (i <= 2 ? step : 0), parameters[1] + (i > 2 ? step : 0));
+    for (int i = 0; i < slabs; i++) {
+        const alb_slab slab = slab_at(p->known, places[i]);
         alb_slab_light_create(&light[i], &slab, p->end_mm, &reasons[i]);
     }
-    for (int i = 0; i < 5; i++)
+    for (int i = 0; i < slabs; i++)
         if (reasons[i].status != ALB_OK)
             return alb_fail(error, reasons[i].status, "%s", reasons[i].text);
     for (int side = 0; side < ALB_SIDES; side++) {
         const alb_operator *forward = p->sides[side].forward;
         for (int k = 0; forward && k < forward->grid_count; k++) {
-            double value[5] = {0};
-            for (int i = 0; i < 5; i++)
+            double value[SLABS] = {0};
+            for (int i = 0; i < slabs; i++)
                 value[i] = alb_slab_light_value(&light[i], (alb_side)side, forward->grid_mm[k]);
             p->on_grid[k][0] = value[0];
-            p->on_grid[k][1] = (value[1] - value[2]) / (2 * difference);
-            p->on_grid[k][2] = (value[3] - value[4]) / (2 * difference);
+            for (int c = 0; c < ALB_JOINT_SCALE; c++)
+                p->on_grid[k][1 + c] =
+                    (value[1 + 2 * c] - value[2 + 2 * c]) / (places[1 + 2 * c][c] - places[2 + 2 * c][c]);
         }
         if (forward)
             alb_operator_apply(p->columns[side], forward, (const double(*)[ALB_OPERATOR_COLUMNS])p->on_grid);
@@ -79,22 +96,29 @@ static bool evaluate_sides(problem *p, const double *parameters, alb_error *erro
     return true;
 }
 
-// The readings near the point where the sides were last evaluated: ln(W S) as linear in ln sigma_a and ln sigma_s'.
+// The readings near the point where the sides were last evaluated: ln(W S) as linear in ln sigma_a, ln sigma_s' and g.
 static void evaluate(double *residuals, double *jacobian, const double *parameters, const void *context)
 {
     const problem *p = context;
     for (int i = 0; i < p->count; i++) {
         const row *at = &p->rows[i];
-        const double *here = p->columns[at->side][at->index], slope[2] = {here[1] / here[0], here[2] / here[0]};
-        const double model = here[0] * exp(slope[0] * (parameters[0] - p->point[0]) +
-                                           slope[1] * (parameters[1] - p->point[1]) + parameters[2]);
+        const double *here = p->columns[at->side][at->index];
+        double ln_model = parameters[ALB_JOINT_SCALE] + (at->side ? parameters[ALB_JOINT_BALANCE] : 0);
+        for (int c = 0; c < ALB_JOINT_SCALE; c++)
+            ln_model += here[1 + c] / here[0] * (parameters[c] - p->point[c]);
+        const double model = here[0] * exp(ln_model);
         residuals[i] = at->weight * (model - at->value);
         for (int c = 0; jacobian && c < PARAMETERS; c++)
-            jacobian[i * PARAMETERS + c] = at->weight * model * (c == ALB_JOINT_SCALE ? 1 : slope[c]);
+            jacobian[i * PARAMETERS + c] =
+                at->weight * model *
+                (c < ALB_JOINT_SCALE ? here[1 + c] / here[0] : c == ALB_JOINT_SCALE || at->side == ALB_TRANSMISSION);
     }
-    residuals[p->count] = parameters[ALB_JOINT_SCALE] / p->known->scale_relative_sd;
-    for (int c = 0; jacobian && c < PARAMETERS; c++)
-        jacobian[p->count * PARAMETERS + c] = c == ALB_JOINT_SCALE ? 1 / p->known->scale_relative_sd : 0;
+    for (int k = 0; k < PRIORS; k++) {
+        const int prior = ALB_JOINT_ANISOTROPY + k;
+        residuals[p->count + k] = (parameters[prior] - p->prior[k]) / p->prior_sd[k];
+        for (int c = 0; jacobian && c < PARAMETERS; c++)
+            jacobian[(p->count + k) * PARAMETERS + c] = c == prior ? 1 / p->prior_sd[k] : 0;
+    }
 }
 
 // How badly diffusion misses the readings at these parameters, the factor fitted as far as it is open.
@@ -120,6 +144,7 @@ static void start(double parameters[PARAMETERS], const problem *p)
 {
     const alb_diffusion_face face = alb_diffusion_face_at(ALB_DIFFUSION_GROSJEAN, p->known->refractive_index);
     double best = INFINITY;
+    memcpy(parameters + ALB_JOINT_ANISOTROPY, p->prior, sizeof p->prior);
     for (int i = 0; i < GRID; i++)
         for (int j = 0; j < GRID; j++) {
             const double scattering = 0.5 / p->known->thickness_mm * pow(1000, (double)i / (GRID - 1));
@@ -127,7 +152,7 @@ static void start(double parameters[PARAMETERS], const problem *p)
             const double misfit = diffusion_misfit(p, &face, absorption, scattering);
             if (misfit < best) {
                 best = misfit;
-                parameters[0] = log(absorption), parameters[1] = log(scattering), parameters[2] = 0;
+                parameters[0] = log(absorption), parameters[1] = log(scattering);
             }
         }
 }
@@ -214,10 +239,10 @@ static bool invert(double inverse[PARAMETERS][PARAMETERS], double a[PARAMETERS][
 static void weigh_up(alb_joint *joint, const double *parameters, const problem *p, double *jacobian)
 {
     double information[PARAMETERS][PARAMETERS] = {{0}}, bound[PARAMETERS][PARAMETERS];
-    joint->degrees_of_freedom = p->count + 1 - PARAMETERS;
+    joint->degrees_of_freedom = p->count + PRIORS - PARAMETERS;
     joint->undecided[0] = 0;
-    evaluate(jacobian + (p->count + 1) * PARAMETERS, jacobian, parameters, p);
-    for (int i = 0; i <= p->count; i++)
+    evaluate(jacobian + (p->count + PRIORS) * PARAMETERS, jacobian, parameters, p);
+    for (int i = 0; i < p->count + PRIORS; i++)
         for (int a = 0; a < PARAMETERS; a++)
             for (int b = 0; b < PARAMETERS; b++)
                 information[a][b] += jacobian[i * PARAMETERS + a] * jacobian[i * PARAMETERS + b];
@@ -238,7 +263,7 @@ static double misfit(double *residuals, const double *parameters, const problem 
 {
     double sum = 0;
     evaluate(residuals, NULL, parameters, p);
-    for (int i = 0; i <= p->count; i++)
+    for (int i = 0; i < p->count + PRIORS; i++)
         sum += residuals[i] * residuals[i];
     return sum;
 }
@@ -265,7 +290,11 @@ static bool minimise(alb_joint *joint, double *parameters, problem *p, double *j
             lower[c] = best[c] - reach[c];
             upper[c] = best[c] + reach[c];
         }
-        const alb_problem least_squares = {PARAMETERS, p->count + 1, evaluate, p, lower, upper};
+        if (p->known->anisotropy_sd > 0) {
+            lower[ALB_JOINT_ANISOTROPY] = fmax(lower[ALB_JOINT_ANISOTROPY], 0);
+            upper[ALB_JOINT_ANISOTROPY] = fmin(upper[ALB_JOINT_ANISOTROPY], most_anisotropy);
+        }
+        const alb_problem least_squares = {PARAMETERS, p->count + PRIORS, evaluate, p, lower, upper};
         if (!alb_solve(parameters, &joint->chi_square, &least_squares, error))
             return false;
         if (stalled || now - joint->chi_square < settled)
@@ -277,10 +306,12 @@ static bool minimise(alb_joint *joint, double *parameters, problem *p, double *j
 
 static void conclude(alb_joint *joint, const double *parameters, const problem *p)
 {
-    const alb_slab slab = slab_at(p->known, parameters[0], parameters[1]);
+    const alb_slab slab = slab_at(p->known, parameters);
     joint->absorption_per_mm = slab.absorption_per_mm;
     joint->reduced_scattering_per_mm = exp(parameters[1]);
-    joint->scale = exp(parameters[2]);
+    joint->anisotropy = slab.anisotropy;
+    joint->scale = exp(parameters[ALB_JOINT_SCALE]);
+    joint->balance = exp(parameters[ALB_JOINT_BALANCE]);
     joint->unscattered = alb_slab_scale(&slab, ALB_HARMONICS_ORDER).beam.leaving[ALB_TRANSMISSION];
     const double sigma = joint->absorption_per_mm + joint->reduced_scattering_per_mm;
     joint->albedo = joint->reduced_scattering_per_mm / sigma;
@@ -293,7 +324,7 @@ static void conclude(alb_joint *joint, const double *parameters, const problem *
     }
     for (int side = 0; side < ALB_SIDES; side++)
         joint->from_mm[side] = joint->used[side] ? joint->from_mm[side] : 0;
-    for (int a = 0; a < ALB_JOINT_SCALE && !joint->undecided[0]; a++)
+    for (int a = 0; a < ALB_JOINT_ANISOTROPY && !joint->undecided[0]; a++)
         if (joint->relative_sd[a] > 0.5)
             snprintf(joint->undecided, sizeof joint->undecided, "the %s is known to %.0f %% only",
                      a == ALB_JOINT_ABSORPTION ? "absorption" : "scattering", 100 * joint->relative_sd[a]);
@@ -305,9 +336,10 @@ static bool check_request(const alb_joint_side sides[ALB_SIDES], const alb_joint
         return alb_fail(error, ALB_UNDECIDED,
                         "transmission alone does not tell absorption from scattering: give the reflection as well");
     if (!(known->thickness_mm > 0 && known->refractive_index >= 1 && known->refractive_index <= 3 &&
-          known->anisotropy >= 0 && known->anisotropy <= 0.95 && known->scale_relative_sd > 0))
+          known->anisotropy >= 0 && known->anisotropy <= most_anisotropy && known->anisotropy_sd >= 0 &&
+          known->scale_relative_sd > 0 && known->balance_relative_sd >= 0))
         return alb_fail(error, ALB_BAD_DATA,
-                        "a slab of thickness %g mm, index %g (1 to 3), g %g (0 to 0.95), scale known to %g: thickness "
+                        "a slab of thickness %g mm, index %g (1 to 3), g %g (0 to 0.9), scale known to %g: thickness "
                         "and scale's sd are to be above zero",
                         known->thickness_mm, known->refractive_index, known->anisotropy, known->scale_relative_sd);
     return true;
@@ -329,14 +361,18 @@ static bool allocate(problem *p, double **jacobian, alb_error *error)
     }
     return (p->rows = alb_allocate(rows, sizeof *p->rows, error)) &&
            (p->on_grid = alb_allocate(grid, sizeof *p->on_grid, error)) &&
-           (*jacobian = alb_allocate((rows + 1) * (PARAMETERS + 1), sizeof **jacobian, error));
+           (*jacobian = alb_allocate((rows + PRIORS) * (PARAMETERS + 1), sizeof **jacobian, error));
 }
 
 bool alb_joint_fit(alb_joint *joint, const alb_joint_side sides[ALB_SIDES], const alb_joint_known *known,
                    alb_error *error)
 {
     *joint = (alb_joint){0};
-    problem p = {.sides = sides, .known = known};
+    problem p = {.sides = sides,
+                 .known = known,
+                 .prior = {known->anisotropy, 0, 0},
+                 .prior_sd = {fmax(known->anisotropy_sd, 1e-6), known->scale_relative_sd,
+                              fmax(known->balance_relative_sd, 1e-6)}};
     double *jacobian = NULL, parameters[PARAMETERS];
     bool ok = check_request(sides, known, error) && allocate(&p, &jacobian, error);
     if (!ok)

@@ -6,8 +6,10 @@
 
 typedef struct alb_joint_known {
     double thickness_mm, refractive_index;
-    double anisotropy;        // g of Henyey and Greenstein's phase function
-    double scale_relative_sd; // of the readings' common factor: what the calibration leaves open; > 0
+    double anisotropy;          // g of Henyey and Greenstein's phase function
+    double anisotropy_sd;       // 0: known; above: fitted as well, within 0 to 0.9
+    double scale_relative_sd;   // of the readings' common factor: what the calibration leaves open; > 0
+    double balance_relative_sd; // of the transmission's factor over the reflection's; 0: they share it
 } alb_joint_known;
 
 // Readings of one face and how a profile makes them; NULL: not measured.
@@ -16,13 +18,22 @@ typedef struct alb_joint_side {
     const alb_operator *forward;
 } alb_joint_side;
 
-enum { ALB_JOINT_ABSORPTION, ALB_JOINT_SCATTERING, ALB_JOINT_SCALE, ALB_JOINT_PARAMETERS };
+enum {
+    ALB_JOINT_ABSORPTION,
+    ALB_JOINT_SCATTERING,
+    ALB_JOINT_ANISOTROPY,
+    ALB_JOINT_SCALE,
+    ALB_JOINT_BALANCE,
+    ALB_JOINT_PARAMETERS
+};
 
 typedef struct alb_joint {
-    double absorption_per_mm, reduced_scattering_per_mm, scale; // readings = scale * model
+    double absorption_per_mm, reduced_scattering_per_mm, scale, balance; // readings = scale * model; of T: * balance
+    double anisotropy;
     double relative_sd[ALB_JOINT_PARAMETERS];    // of each; wider than the bound where chi-square asks for it
     double relative_bound[ALB_JOINT_PARAMETERS]; // Cramer and Rao's, of the readings' sd and the model's accuracy alone
-    double covariance[ALB_JOINT_PARAMETERS][ALB_JOINT_PARAMETERS]; // of the logarithms; relative_sd^2 on the diagonal
+    double covariance[ALB_JOINT_PARAMETERS]
+                     [ALB_JOINT_PARAMETERS]; // of the logarithms and of g itself, as are relative_sd and relative_bound
     double chi_square;
     int degrees_of_freedom;
     int used[ALB_SIDES];          // readings

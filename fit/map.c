@@ -1,11 +1,11 @@
 // Fits of many spots, and the test of whether they are alike.
 //
 // All spots have one form, so that their parameters compare: the one that most of VOTERS spots, evenly spread, take by
-// themselves (choose.c); of two that are taken as often the simpler one. Each spot is fitted from where those came out,
-// the best of them counts, and against its own noise alone: what all share (scale, a form that is an approximation)
-// moves them together and is in the mean material's sd. Two quantities say whether the spots are alike, for every form
-// has them and they are known better than its parameters: the total, and the distance h within which half of it leaves,
-// P(h) = total / (4 pi), whose derivatives
+// themselves (choose.c); of two that are taken as often the simpler one. Each spot is fitted from where those of the
+// least and of the largest total came out, the better one counts, and against its own noise alone: what all share
+// (scale, a form that is an approximation) moves them together and is in the mean material's sd. Two quantities say
+// whether the spots are alike, for every form has them and they are known better than its parameters: the total, and
+// the distance h within which half of it leaves, P(h) = total / (4 pi), whose derivatives
 //   dh/dp = (dtotal/dp / (4 pi) - dP/dp) / (S(h) h)
 // carry the covariance to its sd. Alike: sum (x_i - mean)^2 / sd_i^2 is chi-square distributed with n - 1 degrees of
 // freedom. Stops being true where the sd are not small against the values (a spot known to half of itself), or where
@@ -70,14 +70,13 @@ static void half_light(double *half_mm, double *half_sd_mm, const alb_fitted *fi
     *half_sd_mm = sqrt(fmax(variance, 0));
 }
 
-// What spots start from: the form, and the profiles of those asked that took it.
+// What spots start from: the form and, of those asked that took it, the profiles of the least and of the largest total.
 typedef struct starts {
     alb_candidate candidate;
-    int count;
-    alb_profile profiles[VOTERS];
+    alb_profile ends[2];
 } starts;
 
-// Fits one spot, from every start; form NONE where its readings do not decide.
+// Fits one spot, from both ends; form NONE where its readings do not decide.
 static bool fit_spot(alb_fitted *fitted, const starts *from, double flux_sd, const alb_readings *readings,
                      const alb_operator *forward, alb_error *error)
 {
@@ -87,8 +86,8 @@ static bool fit_spot(alb_fitted *fitted, const starts *from, double flux_sd, con
     int which;
     double gradient[ALB_PARAMETERS_MAX], variance = 0;
     *fitted = (alb_fitted){.chi_square = INFINITY};
-    for (int i = 0; i < from->count; i++) {
-        alb_profile profile = from->profiles[i];
+    for (int i = 0; i < 2; i++) {
+        alb_profile profile = from->ends[i];
         double chi_square = INFINITY;
         if (!alb_search_polish(&profile, &chi_square, from->candidate, &weighing, error))
             return false;
@@ -170,10 +169,15 @@ static bool vote(starts *from, int count, alb_map_read read, const void *context
     if (!chosen)
         return alb_fail(error, ballots[0].reason.status == ALB_NO_MEMORY ? ALB_NO_MEMORY : ALB_UNDECIDED,
                         "none of the %d spots asked decides; the first: %s", voters, ballots[0].reason.text);
-    *from = (starts){.candidate = chosen->candidate};
+    *from = (starts){chosen->candidate, {chosen->profile, chosen->profile}};
     for (int v = 0; v < voters; v++)
-        if (agree(chosen, &ballots[v]))
-            from->profiles[from->count++] = ballots[v].profile;
+        if (agree(chosen, &ballots[v])) {
+            const double total = alb_profile_total(&ballots[v].profile);
+            if (total < alb_profile_total(&from->ends[0]))
+                from->ends[0] = ballots[v].profile;
+            if (total > alb_profile_total(&from->ends[1]))
+                from->ends[1] = ballots[v].profile;
+        }
     return true;
 }
 

@@ -254,6 +254,7 @@ static bool fit_side(alb_map *map, alb_fitting *fitting, const lamp *light, alb_
             return false;
         alb_measurement *measurement = &fitting->sides[side][c];
         measurement->measured = true;
+        measurement->common = common;
         take_mean(&measurement->outcome, layer, common);
         fitting->material.fitted[side][c] = measurement->outcome.fitted;
         if (layer->total.count < light->count)
@@ -340,10 +341,12 @@ bool alb_map_from_session(alb_map *map, alb_fitting *fitting, alb_provenance *pr
              map_product(map, fitting, provenance, notes, calibration, product, &light, error);
     }
     lamp_free(&light);
-    if (ok)
+    if (ok) {
         judge(map, calibration->channels);
-    else
+        alb_fitting_find_properties(fitting);
+    } else {
         alb_map_free(map);
+    }
     return ok;
 }
 

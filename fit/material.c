@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static void find_properties(alb_fitting *fitting)
+void alb_fitting_find_properties(alb_fitting *fitting)
 {
     for (int i = 0; i < ALB_SIDES * 3; i++)
         fitting->basis.common_sd[i / 3][i % 3] = fitting->sides[i / 3][i % 3].common.flux;
@@ -18,6 +18,25 @@ static void find_properties(alb_fitting *fitting)
         fitting->material.optical[c] =
             (alb_optical_estimate){fitting->properties[c].known && !fitting->properties[c].half_space,
                                    optical->absorption_per_mm, optical->reduced_scattering_per_mm};
+    }
+}
+
+// The same slabs by their images. The anisotropy is the caller's guess: left open, as far as the images decide it.
+static void find_images(alb_fitting *fitting)
+{
+    const double anisotropy_sd = 0.5;
+    if (!fitting->absolute || !(fitting->material.thickness_mm > 0) || fitting->basis.finish != ALB_FINISH_SMOOTH)
+        return;
+    for (int c = 0; c < fitting->material.channels; c++) {
+        alb_joint_side sides[ALB_SIDES] = {{0}};
+        for (int side = 0; side < ALB_SIDES; side++)
+            if (fitting->sides[side][c].measured)
+                sides[side] = (alb_joint_side){&fitting->sides[side][c].readings, &fitting->sides[side][c].forward};
+        const alb_joint_known known = {fitting->material.thickness_mm,   fitting->material.refractive_index,
+                                       fitting->basis.anisotropy,        anisotropy_sd,
+                                       fitting->sides[0][c].common.flux, M_SQRT2 * fitting->basis.own_sd};
+        if (sides[ALB_REFLECTION].readings && sides[ALB_TRANSMISSION].readings)
+            alb_image_properties_find(&fitting->properties[c].images, sides, &known);
     }
 }
 
@@ -41,7 +60,8 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
     for (int i = 0; i < ALB_SIDES * 3; i++)
         if (fitting->sides[i / 3][i % 3].measured)
             fitting->material.fitted[i / 3][i % 3] = fitting->sides[i / 3][i % 3].outcome.fitted;
-    find_properties(fitting);
+    alb_fitting_find_properties(fitting);
+    find_images(fitting);
     return true;
 }
 

@@ -23,6 +23,9 @@ typedef struct alb_fitting {
 
 // Fits every side and channel whose readings and forward model are there.
 bool alb_fitting_run(alb_fitting *fitting, alb_error *error);
+// Absorption and scattering from the totals of the material's sides and what is common to their readings;
+// alb_fitting_run ends with it.
+void alb_fitting_find_properties(alb_fitting *fitting);
 void alb_fitting_free(alb_fitting *fitting);
 
 // Puts the content of material.json into an open object.

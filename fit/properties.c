@@ -115,6 +115,7 @@ void alb_properties_put(alb_json *json, const alb_properties *p)
     } else {
         alb_json_string(json, "refused", p->refused);
     }
+    alb_image_properties_put(json, &p->images);
     alb_json_end_object(json);
 }
 
@@ -123,6 +124,7 @@ void alb_properties_note(alb_text *notes, const char *channel, const alb_propert
     const alb_optical *o = &p->optical;
     if (*p->refused)
         alb_text_add(notes, "%s: no optical properties: %s.\n", channel, p->refused);
+    alb_image_properties_note(notes, channel, &p->images);
     if (!p->known)
         return;
     if (p->half_space) {
@@ -169,16 +171,16 @@ bool alb_properties_read(alb_optical_estimate *out, alb_node channel, alb_error 
     if (!alb_node_has(channel, "optical_properties"))
         return true;
     if (!alb_node_object(&properties, channel, "optical_properties", error) ||
-        !alb_node_text(&text, properties, "method", error))
+        !alb_node_text(&text, properties, "method", error) || !alb_image_properties_check(properties, error))
         return false;
     if (alb_node_has(properties, "refused"))
-        return alb_node_allow(properties, "method refused", error) &&
+        return alb_node_allow(properties, "method refused images", error) &&
                alb_node_text(&text, properties, "refused", error);
     const bool slab = alb_node_has(properties, "absorption_per_mm");
     if (!alb_node_allow(properties,
                         slab ? "method anisotropy_assumed reduced_albedo absorption_per_mm reduced_scattering_per_mm "
                                "correlation relative_change_by_scale relative_change_by_thickness "
-                               "with_other_anisotropy by_diffusion flags"
+                               "with_other_anisotropy by_diffusion flags images"
                              : "method anisotropy_assumed reduced_albedo flags",
                         error) ||
         !alb_node_number(&value, properties, "anisotropy_assumed", -1, 1, error) ||

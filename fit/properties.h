@@ -3,6 +3,7 @@
 #pragma once
 #include "base/json.h"
 #include "base/record.h"
+#include "fit/images.h"
 #include "fit/material.h"
 #include "fit/optical.h"
 
@@ -14,6 +15,7 @@ typedef struct alb_properties {
     double other_anisotropy, other[2]; // sigma_a, sigma_s' of the same totals with another anisotropy: the price of not
                                        // knowing it; NaN where no slab has them
     char refused[320];
+    alb_image_properties images; // the same slab by its images
 } alb_properties;
 
 // What the totals do not say themselves.

@@ -52,6 +52,61 @@ static void rig_free(rig *r)
     alb_readings_free(&r->readings);
 }
 
+// Readings under a spot: the columns interpolated in ln b are those of the operator.
+static void columns_under_a_spot(void **state)
+{
+    (void)state;
+    enum { RINGS = 60 };
+    static const double radius_mm = 0.5;
+    alb_error error = {0};
+    alb_readings readings = {0};
+    alb_spot spot = {0};
+    alb_operator forward = {0};
+    alb_basis basis = {0};
+    check_ok(alb_readings_create(&readings, RINGS, &error), &error);
+    for (int i = 0; i < RINGS; i++) {
+        readings.r_mm[i] = 0.1 + 0.15 * i;
+        for (int k = 0; k < ALB_RING_SAMPLES; k++) {
+            readings.sample_r_mm[i][k] = readings.r_mm[i] + 0.1 * (k / (ALB_RING_SAMPLES - 1.0) - 0.5);
+            readings.sample_share[i][k] = 1.0 / ALB_RING_SAMPLES;
+        }
+    }
+    readings.outer_mm = 9;
+    check_ok(alb_spot_disc(&spot, radius_mm, &error), &error);
+    check_ok(alb_operator_create(&forward, &readings, &spot, &error), &error);
+    check_ok(alb_basis_create(&basis, &readings, &forward, &error), &error);
+    const size_t rows = (size_t)basis.rows;
+    double *room = calloc(9 * rows, sizeof *room), worst = 0;
+    double(*grid)[ALB_OPERATOR_COLUMNS] = calloc((size_t)forward.grid_count, sizeof *grid);
+    double(*exact)[ALB_OPERATOR_COLUMNS] = calloc(RINGS, sizeof *exact);
+    assert_true(room && grid && exact);
+    for (int i = 0; i < RINGS; i++)
+        room[i] = basis.share[i];
+    const alb_whitened whitened = {&basis, room, NULL, room + rows};
+    for (double b = 0.02; b < 20; b *= 1.23) {
+        alb_term term = {.column = room + 2 * rows, .first = room + 3 * rows, .second = room + 4 * rows};
+        alb_term_evaluate(&term, &whitened, log(b), room + 5 * rows);
+        for (int k = 0; k < forward.grid_count; k++) {
+            grid[k][0] = exp(-b * forward.grid_mm[k]);
+            grid[k][1] = -b * forward.grid_mm[k] * grid[k][0];
+        }
+        alb_operator_apply(exact, &forward, (const double(*)[ALB_OPERATOR_COLUMNS])grid);
+        for (int i = 0; i < RINGS; i++) { // h^4 / 384 of an effective distance that bends by the spot's size
+            worst = fmax(worst, fabs(term.column[i] / exact[i][0] - 1) / (b * radius_mm));
+            check_near(term.column[i], exact[i][0], 1e-6 * b * radius_mm * exact[i][0]);
+            check_near(term.first[i], exact[i][1], 1e-4 * b * radius_mm * exact[i][0]); // h^3
+        }
+    }
+    print_message("columns under a spot: relative error at most %.2g b P\n", worst);
+    free(exact);
+    free(grid);
+    free(room);
+    alb_basis_free(&basis);
+    alb_operator_free(&forward);
+    alb_spot_free(&spot);
+    alb_readings_free(&readings);
+}
+
 enum { PROFILES = 600 };
 
 // As low as an exhaustive search gets, in every one of the profiles, wherever that is below the single exponential.
@@ -219,6 +274,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_exponential_is_exact),
+        cmocka_unit_test(columns_under_a_spot),
         cmocka_unit_test(derivatives_are_derivatives),
         cmocka_unit_test(global_minimum),
         cmocka_unit_test(huge_dynamic_range),
