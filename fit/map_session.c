@@ -155,6 +155,27 @@ static void keep_whole_rings(alb_readings *readings, const alb_site *site)
     }
 }
 
+// A ring's samples four by four: a forward model of a quarter of the work. Within a quarter of a ring of width w the
+// mean stands for the samples to (b w)^2 / 384 of a profile that falls as e^(-b r): 1e-4 where it falls by a fifth a
+// ring.
+static void merge_samples(alb_readings *readings)
+{
+    enum { MERGED = 4 };
+    for (int i = 0; i < readings->count; i++)
+        for (int k = 0; k < ALB_RING_SAMPLES; k += MERGED) {
+            double share = 0, r_mm = 0, value = 0;
+            for (int m = k; m < k + MERGED; m++) {
+                share += readings->sample_share[i][m];
+                r_mm += readings->sample_share[i][m] * readings->sample_r_mm[i][m];
+                value += readings->sample_share[i][m] * readings->sample_value[i][m];
+                readings->sample_share[i][m] = 0;
+            }
+            readings->sample_share[i][k] = share;
+            readings->sample_r_mm[i][k] = share > 0 ? r_mm / share : 0;
+            readings->sample_value[i][k] = share > 0 ? value / share : 0;
+        }
+}
+
 static bool read_spot(alb_readings *readings, alb_operator *forward, int i, const void *context, alb_error *error)
 {
     const lit *from = context;
@@ -169,6 +190,7 @@ static bool read_spot(alb_readings *readings, alb_operator *forward, int i, cons
         alb_observe_whole(readings, &cut, error) && light_about(&spot, from, i, readings->x_mm, readings->y_mm, error);
     if (ok) {
         keep_whole_rings(readings, &from->sites[i]);
+        merge_samples(readings);
         ok = alb_operator_create(forward, readings, &spot, error);
     }
     alb_spot_free(&spot);
