@@ -25,7 +25,9 @@ typedef struct alb_outcome {
     int attempt_count;           // others than one and two exponentials are tried only where these do not stand
     double discrepancy_relative; // 0: the form fits within the noise
     double rms_relative;         // (measured - fitted) / fitted over the readings above 3 sd
-    double measured_share;       // share of the total within the readings
+    // Transmission: light that came straight through, in readings left out to ballistic_to_mm; 0: none found.
+    double ballistic_share, ballistic_sd, ballistic_to_mm;
+    double measured_share;                                     // share of the total within the readings
     double slope_per_mm, slope_sd, slope_from_mm, slope_to_mm; // d ln S / dr over the outer half of the readings
     alb_knowledge knowledge;
     alb_sensitivity sensitivity;           // of the total to the range of the readings

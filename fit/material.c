@@ -1,5 +1,6 @@
 // material.json: written by fit, read strictly by render.
 #include "base/record.h"
+#include "fit/ballistic.h"
 #include "fit/energy.h"
 #include "fit/offset.h"
 #include "fit/profile.h"
@@ -48,7 +49,10 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
         alb_measurement *measurement = &fitting->sides[i / 3][i % 3];
         if (!measurement->forward.grid_mm)
             continue;
-        measurement->measured = alb_offset_choose(measurement, &reasons[i]);
+        measurement->measured =
+            alb_offset_choose(measurement, &reasons[i]) &&
+            (i / 3 != ALB_TRANSMISSION || alb_ballistic_find(&measurement->outcome, &measurement->readings,
+                                                             &measurement->forward, measurement->common, &reasons[i]));
     }
     for (int i = 0; i < ALB_SIDES * 3; i++)
         if (reasons[i].status != ALB_OK)
@@ -161,6 +165,10 @@ static void put_outcome(alb_json *json, const char *side, const alb_outcome *out
                         : "the noise alone");
     alb_json_number(json, "discrepancy_relative", outcome->discrepancy_relative);
     alb_json_number(json, "rms_relative", outcome->rms_relative);
+    if (outcome->ballistic_share > 0) {
+        alb_json_estimate(json, "ballistic_share", outcome->ballistic_share, outcome->ballistic_sd);
+        alb_json_number(json, "left_out_to_mm", outcome->ballistic_to_mm);
+    }
     alb_json_number(json, "measured_share_of_total", outcome->measured_share);
     alb_json_object(json, "tail_slope_per_mm");
     alb_json_number(json, "value", outcome->slope_per_mm);
@@ -255,7 +263,7 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
                         "form decay_ratio_held identifiable best_guess undecided parameters covariance condition total "
                         "total_without_inner_fifth total_without_outer_fifth offset_per_mm2 offset_instead energy_held "
                         "chi_square degrees_of_freedom errors_from discrepancy_relative rms_relative "
-                        "measured_share_of_total tail_slope_per_mm tried",
+                        "ballistic_share left_out_to_mm measured_share_of_total tail_slope_per_mm tried",
                         error) ||
         !alb_node_text(&form, node, "form", error))
         return false;

@@ -185,6 +185,17 @@ double alb_profile_slowest(const alb_profile *profile)
     return row->slowest(row, profile->parameters);
 }
 
+double alb_profile_fastest(const alb_profile *profile)
+{
+    double fastest = alb_profile_slowest(profile);
+    for (int p = 0; p < alb_form_parameter_count(profile->form); p++) {
+        const alb_parameter *parameter = alb_form_parameter(profile->form, p);
+        if (!parameter->flux && parameter->length < 0)
+            fastest = fmax(fastest, profile->parameters[p]);
+    }
+    return fastest;
+}
+
 bool alb_profile_sound(const alb_profile *profile)
 {
     const alb_form_row *row = rows[profile->form];

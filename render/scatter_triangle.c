@@ -13,7 +13,8 @@
 //
 // P is tabulated as P / r^2, which tends to S(0) / 2 and keeps the digits of small discs, by cubic Hermite pieces:
 // error (b d)^4 / 384 of it at spacing d for e^(-b r), 3e-10 at b d = 0.02. Where the middles of the pieces say more
-// than 1e-6 the closed form stays. S is tabulated by straight pieces in floats: (b d)^2 / 8 of it.
+// than 1e-6 (and for forms that go as 1/r) the closed form stays. S is tabulated by straight pieces in floats: (b d)^2
+// / 8 of it.
 #include "base/memory.h"
 #include "render/scatter.h"
 #include <stdlib.h>
@@ -79,7 +80,10 @@ bool alb_radial_create(alb_radial *radial, const alb_profile profiles[3], double
     }
     for (int k = 0; k < ALB_SCATTER_TABLE + 2; k++)
         for (int c = 0; c < 3; c++) {
-            const double r = k / radial->entries_per_mm, s = alb_profile_value(&profiles[c], r);
+            const double r = k / radial->entries_per_mm, near = 0.5 / radial->entries_per_mm;
+            const double at = alb_profile_value(&profiles[c], r);
+            // a form that is infinite at 0: its mean nearby
+            const double s = isfinite(at) ? at : alb_profile_ring(&profiles[c], 0, near);
             const double p = k ? alb_profile_disc(&profiles[c], r) / (r * r) : 0.5 * s;
             // (P / r^2)' = S / r - 2 P / r^3
             radial->discs[k][c][0] = p;

@@ -1,11 +1,10 @@
 // Readings of slabs as a camera would take them, from photons that share no formula with what is fitted: Monte Carlo
 // rings of a pencil beam, spread over an evenly lit disc and read on rings about its centre.
 #pragma once
-#include "base/random.h"
+#include "base/statistics.h"
 #include "capture/photon.h"
-#include "check.h"
 #include "fit/choose.h"
-#include <string.h>
+#include <math.h>
 
 enum { SLABS_RINGS_MAX = 64, SLABS_PARTS = 24 };
 static const double slabs_spot_mm = 0.5, slabs_range = 3000;
@@ -38,16 +37,16 @@ static const slab slabs[] = {
     {"thin 2 mm", 0.01, 0.5, 0, 2, 19, 1000000},
     {"thin 5 mm", 0.01, 0.5, 0, 5, 25, 1000000},
     {"thin 5 mm g 0.9", 0.01, 0.5, 0.9, 5, 25, 200000},
-    {"dark 5 mm", 0.4, 1.0, 0, 5, 8.5, 1000000},
+    {"dark 5 mm", 0.4, 1.0, 0, 5, 8.5, 6000000},
     {"dark half-space", 0.4, 1.0, 0, 200, 6, 1000000},
 };
 enum { SLABS = sizeof slabs / sizeof slabs[0] };
 
-static inline bool slabs_trace(alb_photon_tally *tally, const slab *slab, double more)
+static inline bool slabs_trace(alb_photon_tally *tally, const slab *body, double more)
 {
-    const alb_medium medium = {slab->absorption_per_mm, slab->reduced_scattering_per_mm / (1 - slab->anisotropy),
-                               slab->anisotropy, 1.5, slab->thickness_mm};
-    return alb_photon_trace(tally, &medium, slab->radius_mm, (long)(more * (double)slab->photons), 1, 1, NULL);
+    const alb_medium medium = {body->absorption_per_mm, body->reduced_scattering_per_mm / (1 - body->anisotropy),
+                               body->anisotropy, 1.5, body->thickness_mm};
+    return alb_photon_trace(tally, &medium, body->radius_mm, (long)(more * (double)body->photons), 1, 1, NULL);
 }
 
 // Share of a circle of radius rho about a point at distance r that lies in the disc of light.
@@ -81,19 +80,32 @@ static inline void slabs_thin(double *radius, double *light, const double *edges
     }
 }
 
+// Relative sd that the photons give a reading.
+static inline double slabs_noise(const alb_readings *readings, int i)
+{
+    const double relative = readings->sd[i] / readings->value[i];
+    return sqrt(fmax(0, relative * relative - 1e-4));
+}
+
+// Whether enough light left through the face for its rings to be worth a fit.
+static inline bool slabs_seen(const alb_photon_tally *tally, const slab *body, double more, alb_side side)
+{
+    return (tally->leaving[side] - tally->unscattered[side]) * more * (double)body->photons > 4e4;
+}
+
 // Readings of one face from 0 out to 1/3000 of that at the spot's edge (reflection) or the middle (transmission): rings
 // 0.1 mm wide to 1 mm, then growing by a sixteenth; sd 1 % and that of the photons. What has not scattered is left out
 // where `ballistic` is false (a camera would mask it), and is in the lit rings where it is true.
-static inline void slabs_readings(alb_readings *readings, const alb_photon_tally *tally, alb_side side, bool ballistic)
+static inline bool slabs_readings(alb_readings *readings, const alb_photon_tally *tally, alb_side side, bool ballistic)
 {
     enum { THIN = ALB_PHOTON_BINS * SLABS_PARTS };
     static double radius[THIN], light[THIN];
     double edge[SLABS_RINGS_MAX + 1], reference = 0;
-    alb_error error = {0};
     slabs_thin(radius, light, tally->edges_mm, tally->ring[side]);
     for (int i = 0; i <= SLABS_RINGS_MAX; i++)
         edge[i] = i <= 10 ? 0.1 * i : pow(1.0625, i - 10);
-    check_ok(alb_readings_create(readings, SLABS_RINGS_MAX, &error), &error);
+    if (!alb_readings_create(readings, SLABS_RINGS_MAX, NULL))
+        return false;
     int n = 0;
     for (; n < SLABS_RINGS_MAX && edge[n + 1] + slabs_spot_mm < tally->edges_mm[ALB_PHOTON_BINS]; n++) {
         double value = 0, r_mean = 0, area = 0;
@@ -126,4 +138,5 @@ static inline void slabs_readings(alb_readings *readings, const alb_photon_tally
     }
     readings->count = n;
     readings->outer_mm = readings->complete_mm = edge[n];
+    return true;
 }

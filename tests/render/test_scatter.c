@@ -109,6 +109,37 @@ static void far_triangles_need_seven_points(void **state)
     }
 }
 
+// Forms that are infinite at r = 0, or flat there: no energy is made or lost on any patches.
+static void singular_and_flat_forms_give_their_total(void **state)
+{
+    (void)state;
+    for (int cells = 8; cells <= 32; cells *= 2) {
+        alb_surface wax = {.name = "wax", .scatters = true, .slab = true};
+        const alb_profile forms[ALB_SIDES][3] = {{{ALB_FORM_BURLEY, {0.5, 1}},
+                                                  {ALB_FORM_TWO_OVER_R, {0.02, 0.35, 0.3, 4}},
+                                                  {ALB_FORM_BURIED_AND_OVER_R, {0.02, 0.4, 2, 0.3, 3}}},
+                                                 {{ALB_FORM_BURIED_SOURCE, {0.02, 0.35, 4}},
+                                                  {ALB_FORM_TWO_BURIED_SOURCES, {0.01, 0.4, 3, 0.05, 1, 1}},
+                                                  {ALB_FORM_BURLEY, {0.2, 0.02}}}}; // narrow: all in the self-term
+        memcpy(wax.profiles, forms, sizeof forms);
+        const alb_box slab = {.size_mm = {120, 120, 5}, .cells = {cells, cells, 1}, .grading = 1};
+        world w;
+        world_of_box(&w, &slab, &wax);
+        for (size_t p = 0; p < w.patches.count; p++) {
+            const alb_vector c = w.patches.centroids[p];
+            if (fabs(c.x) > 10 || fabs(c.y) > 10)
+                continue;
+            for (int k = 0; k < 3; k++) {
+                const double total = alb_profile_total(&forms[0][k]) + alb_profile_total(&forms[1][k]);
+                assert_true(w.sums[p][k] > 0);
+                // the centroid rule of far pairs falls short by 0.6 % at worst (scatter.c)
+                check_near(w.sums[p][k], total, 6.5e-3 * total);
+            }
+        }
+        world_free(&w);
+    }
+}
+
 // On a slab wide against the profile the middle row of S' sums to the profile's total, for any size of patches, and a
 // narrow profile does so on coarse patches too: the self-term is exact.
 static void wide_slab_gives_the_total(void **state)
@@ -285,10 +316,15 @@ static void columns_balance_rows(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(triangle_integral_is_exact),     cmocka_unit_test(far_triangles_need_seven_points),
-        cmocka_unit_test(wide_slab_gives_the_total),      cmocka_unit_test(needle_profiles_keep_their_total),
-        cmocka_unit_test(fine_patches_need_no_integrals), cmocka_unit_test(grading_does_not_matter),
-        cmocka_unit_test(faces_of_a_slab_are_told_apart), cmocka_unit_test(columns_balance_rows),
+        cmocka_unit_test(triangle_integral_is_exact),
+        cmocka_unit_test(far_triangles_need_seven_points),
+        cmocka_unit_test(wide_slab_gives_the_total),
+        cmocka_unit_test(singular_and_flat_forms_give_their_total),
+        cmocka_unit_test(needle_profiles_keep_their_total),
+        cmocka_unit_test(fine_patches_need_no_integrals),
+        cmocka_unit_test(grading_does_not_matter),
+        cmocka_unit_test(faces_of_a_slab_are_told_apart),
+        cmocka_unit_test(columns_balance_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
