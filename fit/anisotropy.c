@@ -4,7 +4,8 @@
 // the harmonics: of an elliptic spot about its own centroid it is exactly that of the spot made round.
 //
 // Chance: with amplitudes c, s of sd each, sum (c^2 + s^2) / sd^2 over the rings is chi-square with two degrees of
-// freedom a ring where all is round. Rings of clear light: value above 10 sd, at least 16 pixels.
+// freedom a ring where all is round. Rings of clear light: value above 10 sd, at least 16 pixels,
+// not cut by the border.
 #include "fit/anisotropy.h"
 #include "base/statistics.h"
 #include <math.h>
@@ -79,7 +80,8 @@ void alb_anisotropy_of(alb_readings *readings)
         for (int i = 0; i < readings->count; i++) {
             const double c = readings->harmonics[i][2 * h], s = readings->harmonics[i][2 * h + 1],
                          sd = readings->harmonic_sd[i];
-            if (!(readings->value[i] > 10 * readings->sd[i]) || !(sd > 0) || !isfinite(c + s))
+            if (!(readings->value[i] > 10 * readings->sd[i]) || readings->r_mm[i] > readings->complete_mm ||
+                !(sd > 0) || !isfinite(c + s))
                 continue;
             squares += (c * c + s * s) / (sd * sd);
             freedom += 2;

@@ -1,7 +1,7 @@
 // From the pixels of a photograph to readings, and the sentences that warn of what the pixels show.
 //
 // Warned of are: a saturated core; more than a five-hundredth of the pixels left out as glints; rings that are not
-// round (a harmonic above 1 % of the value that noise makes less than once in a thousand times); light beyond the
+// round (a harmonic above 2 % of the value that noise makes less than once in a thousand times); light beyond the
 // readings, or at the border of the image, that a tail cannot be told from. What lies beyond the border is estimated by
 // the fitted form: 1 - 2 pi P(border) / total, a lower bound of what a sample that ends there has lost.
 #include "fit/photo.h"
@@ -14,7 +14,7 @@ static void note_round(alb_text *notes, const char *name, const alb_readings *re
     static const char *const turns[] = {"once", "twice"};
     for (int h = 0; h < 2; h++) {
         const alb_anisotropy *seen = &readings->anisotropy[h];
-        if (seen->chance < 1e-3 && seen->most > 0.01)
+        if (seen->chance < 1e-3 && seen->most > 0.02)
             alb_text_add(
                 notes,
                 "%s: not round: a part that goes %s around is up to %.2g %% of the light (at %.4g mm); oblique "

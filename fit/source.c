@@ -155,6 +155,21 @@ bool alb_exitance_factor(double **factor, alb_text *notes, const alb_calibration
     return true;
 }
 
+// Light that falls aslant is driven aside within the slab: the glow's centre against that of the spot that enters.
+static void note_drift(alb_text *notes, const alb_fitting *fitting, const alb_spot spots[3])
+{
+    for (int c = 0; c < fitting->material.channels; c++) {
+        const alb_readings *seen = &fitting->sides[ALB_REFLECTION][c].readings;
+        const double x = seen->x_mm - spots[c].x_mm, y = seen->y_mm - spots[c].y_mm,
+                     sd = sqrt(seen->centre_covariance_mm2[0] + seen->centre_covariance_mm2[2]);
+        if (hypot(x, y) > 5 * sd && hypot(x, y) > 0.02)
+            alb_text_add(notes,
+                         "%s %s: the glow is centred %.2g +- %.1g mm from the spot on the white reference: the light "
+                         "falls aslant, or one of the two was moved.\n",
+                         alb_side_names[ALB_REFLECTION], fitting->material.channel_names[c], hypot(x, y), sd);
+    }
+}
+
 static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provenance *provenance, alb_text *notes,
                             const alb_calibration *calibration, const alb_product *product, alb_error *error)
 {
@@ -175,6 +190,8 @@ static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provena
                                       calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0),
                                 calibration->views[product->side].relative_length_sd};
         ok = alb_photo_observe(fitting, &seen, notes, error);
+        if (ok && product->side == ALB_REFLECTION)
+            note_drift(notes, fitting, spots);
     }
     free(factor);
     alb_face_free(&face);

@@ -18,7 +18,8 @@ static const char *const files[] = {"s/calibration/white_spot.exr",
                                     "s/calibration.json",
                                     "s/calibration",
                                     "s",
-                                    "image.exr"};
+                                    "image.exr",
+                                    "white.exr"};
 
 static int in_own_folder(void **state)
 {
@@ -182,6 +183,57 @@ static void images_by_hand(void **state)
     free(fitting);
 }
 
+// A Gaussian spot, stated or photographed on white: the same total from both, the true one.
+static void images_of_a_gaussian_spot(void **state)
+{
+    (void)state;
+    enum { FINE = 15 };
+    const alb_profile profile = {ALB_FORM_EXPONENTIAL, {0.1, 1.2}};
+    const double pitch = 0.08, waist = 0.4, x0 = 70.3 * pitch, y0 = 61.7 * pitch;
+    for (int white = 0; white < 2; white++) {
+        alb_error error = {0};
+        alb_image image = {0};
+        check_ok(alb_image_create(&image, WIDTH, HEIGHT, "Y", &error), &error);
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            const double x = i % WIDTH * pitch - x0, y = i / WIDTH * pitch - y0;
+            double sum = 0, weight = 0;
+            for (int k = 0; k < (white ? 1 : FINE * FINE); k++) {
+                const double u = waist * 4 * ((k % FINE + 0.5) / FINE - 0.5),
+                             v = waist * 4 * ((k / FINE + 0.5) / FINE - 0.5);
+                const double e = exp(-2 * (white ? x * x + y * y : u * u + v * v) / (waist * waist));
+                sum += white ? e : e * alb_profile_value(&profile, hypot(x - u, y - v));
+                weight += white ? 1 : e;
+            }
+            alb_random random = alb_random_at(5, (unsigned)white, (unsigned)i);
+            alb_image_at(&image, i % WIDTH, i / WIDTH)[0] =
+                (float)(sum / weight * (1 + 0.01 * alb_random_normal(&random)) +
+                        (white ? 1e-4 : 0) * alb_random_normal(&random));
+        }
+        check_ok(alb_exr_write(&image, NULL, white ? "white.exr" : "image.exr", &error), &error);
+        alb_image_free(&image);
+    }
+    for (int measured = 0; measured < 2; measured++) {
+        alb_error error = {0};
+        alb_provenance provenance = {.command = "fit"};
+        alb_text notes = {0};
+        alb_fitting *fitting = calloc(1, sizeof *fitting);
+        const char *const paths[ALB_SIDES] = {"image.exr", NULL};
+        const alb_image_setting setting = {.mm_per_pixel = pitch,
+                                           .spot_gaussian_mm = measured ? 0 : waist,
+                                           .spot_image = measured ? "white.exr" : NULL};
+        check_ok(alb_fitting_from_images(fitting, &provenance, &notes, paths, &setting, &error), &error);
+        const alb_fitted *fitted = &fitting->material.fitted[ALB_REFLECTION][0];
+        print_message("gaussian spot, %s: decay %.4f, total %+.2f %%\n", measured ? "photographed" : "stated",
+                      fitted->profile.parameters[1], 100 * (fitted->total / alb_profile_total(&profile) - 1));
+        assert_int_equal(fitted->profile.form, ALB_FORM_EXPONENTIAL);
+        check_relative(fitted->profile.parameters[1], 1.2, 0.003);
+        check_relative(fitted->total, alb_profile_total(&profile), 0.005);
+        alb_fitting_free(fitting);
+        alb_text_free(&notes);
+        free(fitting);
+    }
+}
+
 static void what_is_missing_is_named(void **state)
 {
     (void)state;
@@ -209,6 +261,7 @@ static void what_is_missing_is_named(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(session_gives_totals), cmocka_unit_test(images_by_hand),
+                                       cmocka_unit_test(images_of_a_gaussian_spot),
                                        cmocka_unit_test(what_is_missing_is_named)};
     return cmocka_run_group_tests(tests, in_own_folder, leave);
 }
