@@ -165,6 +165,30 @@ static void cut(starts *out, const alb_measure *m, const search *s, int terms)
         }
 }
 
+// From the single exponential and a second term on rungs finer than the grid: where a second term gains next to
+// nothing, its least chi^2 has minima less than two steps of the grid apart.
+static void climb(alb_place *best, search *s, const alb_place *one)
+{
+    static const double rungs[] = {0.35, 0.7, 1.1, 1.6, 2.2, 3};
+    alb_term *first = &s->merged.term[0], *second = &s->merged.term[1];
+    const double pivot = one->x[0];
+    alb_term_evaluate(first, &s->merged.data, pivot, s->merged.work);
+    for (int side = -1; side <= 1; side += 2) {
+        starts from = {0};
+        for (size_t k = 0; k < sizeof rungs / sizeof rungs[0]; k++) {
+            const double x = pivot + side * rungs[k];
+            if (!(x > s->x[0] && x < s->x[s->columns - 1]))
+                break;
+            alb_term_evaluate(second, &s->merged.data, x, s->merged.work);
+            const double c = alb_columns_dot(first->column, second->column, s->merged.data.basis->rows);
+            const double a = second->cc * first->cv - c * second->cv, b = first->cc * second->cv - c * first->cv;
+            const double shift = a > 0 && b > 0 ? fmin(fmax(b / a * (pivot - x), -0.5), 0.5) : 0;
+            from = (starts){1, {{0, {fmin(pivot + shift, x), fmax(pivot + shift, x)}}}};
+            descend(best, s, &from, 2, ALB_POSITIVE);
+        }
+    }
+}
+
 // From the single exponential and a second term at each peak of what that gains, the first moved so that the mean
 // stays.
 static void polish_second(alb_place *best, search *s, const alb_place *one, alb_signs signs)
@@ -194,6 +218,8 @@ static void polish_second(alb_place *best, search *s, const alb_place *one, alb_
         keep(&from, (start){0, {pivot + 0.02, pivot + apart}});
     for (int k = 0; k < from.count; k++)
         polish(best, s, from.list[k].x, 2, signs);
+    if (signs == ALB_POSITIVE)
+        climb(best, s, one);
 }
 
 // No two or three terms come closer than the measure, but for the steps of the grid: where the first start leads as
