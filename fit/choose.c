@@ -9,10 +9,9 @@
 //    parameters, covariance and total are those of this fit, and nothing else enters. Where the data do not identify
 //    its parameters (uncertainty.c), a simpler form that stands and whose parameters they do identify is taken instead.
 // 3. Where none of them stands, Burley's form, one buried source, two exponentials over r, one of each, three
-// exponentials
-//    and two buried sources are fitted (2, 3, 4, 5, 6, 6 parameters); of those that stand and whose parameters the data
-//    identify the one of least BIC is taken. So data made by up to two exponentials see these in one case of 1000 at
-//    most.
+//    exponentials and two buried sources are fitted (2, 3, 4, 5, 6, 6 parameters); of those that stand and whose
+//    parameters the data identify the one of least BIC is taken. So data made by up to two exponentials see these in
+//    one case of 1000 at most.
 // 4. Where no form stands, the form is an approximation and its errors are not those of the noise (discrepancy.c). The
 //    form of least score is taken, among those whose parameters the data decide where there is one; forms of more
 //    than four parameters only where they are decided and their score is less than that of the simpler form.

@@ -30,14 +30,6 @@ static void side_free(side *s)
     *s = (side){0};
 }
 
-static bool vanishes(const alb_profile *profile)
-{
-    for (int p = 0; p < alb_form_parameter_count(profile->form); p++)
-        if (profile->parameters[p] == 0)
-            return true;
-    return false;
-}
-
 // The likelihood of the last fit; none where a term has vanished.
 static bool side_create(side *s, alb_measurement *measurement, alb_error *error)
 {
@@ -45,7 +37,7 @@ static bool side_create(side *s, alb_measurement *measurement, alb_error *error)
     const alb_profile *profile = &outcome->fitted.profile;
     const alb_readings *readings = &measurement->readings;
     *s = (side){.measurement = measurement, .total = outcome->fitted.total, .held = *profile};
-    if (vanishes(profile))
+    if (alb_profile_vanishes(profile))
         return true;
     const bool misfit = outcome->discrepancy_relative > 0;
     double *model = alb_operator_readings(&measurement->forward, profile, error);

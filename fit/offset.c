@@ -59,9 +59,7 @@ static bool try_guess(shifted *best, alb_candidate candidate, double guess, cons
         return true;
     if (!alb_search(&profile, &chi_square, &found, candidate, basis, moved, error))
         return false;
-    for (int p = 0; found && p < alb_form_parameter_count(profile.form); p++)
-        found = profile.parameters[p] != 0;
-    if (!found)
+    if (!found || alb_profile_vanishes(&profile))
         return true;
     if (!alb_likelihood_create(&likelihood, &profile, candidate, moved, true, error))
         return false;

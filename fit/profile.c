@@ -205,6 +205,14 @@ bool alb_profile_sound(const alb_profile *profile)
     return row->sound && row->sound(row, profile->parameters);
 }
 
+bool alb_profile_vanishes(const alb_profile *profile)
+{
+    for (int p = 0; p < alb_form_parameter_count(profile->form); p++)
+        if (profile->parameters[p] == 0)
+            return true;
+    return false;
+}
+
 void alb_profile_order(alb_profile *profile)
 {
     const alb_form_row *row = rows[profile->form];

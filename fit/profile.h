@@ -27,5 +27,7 @@ double alb_profile_slowest(const alb_profile *profile);
 double alb_profile_fastest(const alb_profile *profile);
 // Whether S is finite (but at r = 0 where it is singular), nowhere negative and falls off, with its terms in order.
 bool alb_profile_sound(const alb_profile *profile);
+// Whether a parameter is 0: a term of no light, of which there is nothing to know.
+bool alb_profile_vanishes(const alb_profile *profile);
 // Puts positive terms in order of their decays.
 void alb_profile_order(alb_profile *profile);

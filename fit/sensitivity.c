@@ -15,11 +15,8 @@ bool alb_sensitivity_find(alb_sensitivity *sensitivity, const alb_profile *profi
 {
     const int n = weighing->readings->count, fifth = n / 5;
     *sensitivity = (alb_sensitivity){(double)NAN, (double)NAN};
-    if (n - fifth <= alb_candidate_parameters(candidate) + with_offset)
+    if (n - fifth <= alb_candidate_parameters(candidate) + with_offset || alb_profile_vanishes(profile))
         return true;
-    for (int p = 0; p < alb_form_parameter_count(profile->form); p++)
-        if (profile->parameters[p] == 0)
-            return true;
     double *sd = alb_allocate((size_t)n, sizeof(double), error);
     bool ok = sd != NULL;
     for (int end = 0; ok && end < 2; end++) {

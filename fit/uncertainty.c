@@ -54,14 +54,6 @@ static void describe_tail(alb_outcome *outcome, const alb_readings *readings)
     outcome->slope_sd = sqrt(quadratic_form(gradient, &outcome->fitted, n));
 }
 
-static bool vanishes(const alb_profile *profile)
-{
-    for (int p = 0; p < alb_form_parameter_count(profile->form); p++)
-        if (profile->parameters[p] == 0)
-            return true;
-    return false;
-}
-
 // One parameter's interval into the certainty; worst as alb_likelihood_interval raises it.
 static void find_interval(alb_certainty *certainty, alb_likelihood *likelihood, alb_quantity quantity, double *worst)
 {
@@ -174,7 +166,7 @@ bool alb_knowledge_find(alb_knowledge *knowledge, const alb_profile *profile, al
     const int n = alb_candidate_parameters(candidate);
     alb_likelihood likelihood;
     *knowledge = unknown();
-    if (vanishes(profile))
+    if (alb_profile_vanishes(profile))
         return true;
     for (int p = 0; p < ALB_PARAMETERS_MAX; p++)
         knowledge->parameters[p].because[0] = '\0';
@@ -196,7 +188,7 @@ bool alb_identify(bool *identifiable, char because[ALB_BECAUSE_SIZE], const alb_
     const int n = alb_candidate_parameters(candidate);
     alb_likelihood likelihood;
     alb_knowledge knowledge = unknown();
-    if (!vanishes(profile)) {
+    if (!alb_profile_vanishes(profile)) {
         for (int p = 0; p < n; p++)
             knowledge.parameters[p] = (alb_certainty){.lower = 1, .upper = 1};
         if (!alb_likelihood_create(&likelihood, profile, candidate, weighing, false, error))
@@ -321,7 +313,7 @@ static bool find_covariance_beside_offset(double covariance[ALB_PARAMETERS_MAX][
     double relative[ALB_PARAMETERS_MAX + 1][ALB_PARAMETERS_MAX + 1], condition;
     alb_likelihood likelihood;
     memset(covariance, 0, sizeof(double[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX]));
-    *full_rank = !vanishes(profile);
+    *full_rank = !alb_profile_vanishes(profile);
     if (!*full_rank)
         return true;
     if (!alb_likelihood_create(&likelihood, profile, candidate, weighing, true, error))
