@@ -16,7 +16,7 @@ static const char style[] =
     ":root{color-scheme:light dark;--ink:#1d1d1f;--quiet:#6a6a70;--line:#dcdce0;--ground:#fff;--soft:#f6f6f8}\n"
     "@media(prefers-color-scheme:dark){:root{--ink:#e8e8ea;--quiet:#9c9ca4;--line:#3a3a40;--ground:#18181b;"
     "--soft:#222226}}\n"
-    "body{margin:0 auto;padding:2.5rem 1.25rem 4rem;max-width:70rem;background:var(--ground);color:var(--ink);"
+    "body{margin:0 auto;padding:2.5rem 1.25rem 4rem;max-width:76rem;background:var(--ground);color:var(--ink);"
     "font:16px/1.55 system-ui,-apple-system,\"Segoe UI\",\"Liberation Sans\",Helvetica,Arial,sans-serif}\n"
     "h1{margin:0;font-size:1.75rem;font-weight:600;letter-spacing:-.01em}\n"
     "h2{margin:2.5rem 0 .5rem;font-size:1.2rem;font-weight:600}\n"

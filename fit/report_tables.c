@@ -153,6 +153,53 @@ void alb_report_energy(alb_page *page, const alb_fitting *fitting)
                            "only where that unit is the incident flux.");
 }
 
+// By adding-doubling from the totals.
+static void put_by_totals(alb_page *page, const char *channel, const alb_properties *p)
+{
+    const alb_optical *o = &p->optical;
+    char flags[320] = "";
+    if (!p->known) {
+        alb_page_row(page, "%s|totals|–|–|–|–|–|%s", channel, *p->refused ? p->refused : "not tried");
+        return;
+    }
+    for (int i = 0; i < ALB_OPTICAL_FLAGS; i++)
+        if (o->flags >> i & 1)
+            snprintf(flags + strlen(flags), sizeof flags - strlen(flags), "; %s", alb_optical_flag_text(i));
+    if (p->half_space)
+        alb_page_row(page, "%s|total|–|–|%.4g ± %.2g|%g assumed|–|as of a half-space%s", channel, o->reduced_albedo,
+                     o->reduced_albedo_sd, p->anisotropy, flags);
+    else
+        alb_page_row(page,
+                     "%s|totals|%.4g ± %.2g|%.4g ± %.2g|%.4g ± %.2g|%g assumed|%+.2f|1 %% of scale: %+.2g %%, "
+                     "%+.2g %%%s",
+                     channel, o->absorption_per_mm, o->absorption_sd, o->reduced_scattering_per_mm,
+                     o->reduced_scattering_sd, o->reduced_albedo, o->reduced_albedo_sd, p->anisotropy, o->correlation,
+                     o->by_scale[0], o->by_scale[1], flags);
+}
+
+// By transport in Hankel space from where the light leaves; their factor is fitted.
+static void put_by_images(alb_page *page, const char *channel, const alb_image_properties *p)
+{
+    const alb_joint *j = &p->joint;
+    if (!p->known) {
+        if (*p->refused)
+            alb_page_row(page, "%s|images|–|–|–|–|–|%s", channel, p->refused);
+        return;
+    }
+    const double *sd = j->relative_sd;
+    const double correlation = j->covariance[ALB_JOINT_ABSORPTION][ALB_JOINT_SCATTERING] /
+                               sqrt(j->covariance[ALB_JOINT_ABSORPTION][ALB_JOINT_ABSORPTION] *
+                                    j->covariance[ALB_JOINT_SCATTERING][ALB_JOINT_SCATTERING]);
+    char anisotropy[48];
+    snprintf(anisotropy, sizeof anisotropy, sd[ALB_JOINT_ANISOTROPY] > 0 ? "%.2f ± %.2f" : "%g assumed", j->anisotropy,
+             sd[ALB_JOINT_ANISOTROPY]);
+    alb_page_row(page, "%s|images|%.4g ± %.2g|%.4g ± %.2g|%.4g|%s|%+.2f|scale %.4f ± %.2g; chi-square %.4g / %d%s%s",
+                 channel, j->absorption_per_mm, j->absorption_per_mm * sd[ALB_JOINT_ABSORPTION],
+                 j->reduced_scattering_per_mm, j->reduced_scattering_per_mm * sd[ALB_JOINT_SCATTERING], j->albedo,
+                 anisotropy, correlation, j->scale, j->scale * sd[ALB_JOINT_SCALE], j->chi_square,
+                 j->degrees_of_freedom, *j->undecided ? "; " : "", j->undecided);
+}
+
 void alb_report_properties(alb_page *page, const alb_fitting *fitting)
 {
     bool tried = false;
@@ -161,32 +208,15 @@ void alb_report_properties(alb_page *page, const alb_fitting *fitting)
     if (!tried)
         return;
     alb_page_heading(page, "Optical properties");
-    alb_page_table(page,
-                   "channel|absorption (1/mm)|reduced scattering (1/mm)|reduced albedo|per 1 % of scale|correlation|");
+    alb_page_table(page, "channel|from|absorption (1/mm)|reduced scattering (1/mm)|reduced albedo|anisotropy|"
+                         "correlation|");
     for (int c = 0; c < fitting->material.channels; c++) {
-        const alb_properties *p = &fitting->properties[c];
-        const alb_optical *o = &p->optical;
-        char flags[320] = "";
-        for (int i = 0; p->known && i < ALB_OPTICAL_FLAGS; i++)
-            if (o->flags >> i & 1)
-                snprintf(flags + strlen(flags), sizeof flags - strlen(flags), "%s%s", *flags ? "; " : "",
-                         alb_optical_flag_text(i));
-        if (p->known && p->half_space)
-            alb_page_row(page, "%s|–|–|%.4g ± %.2g|–|–|as of a half-space; g = %g assumed%s%s",
-                         fitting->material.channel_names[c], o->reduced_albedo, o->reduced_albedo_sd, p->anisotropy,
-                         *flags ? "; " : "", flags);
-        else if (p->known)
-            alb_page_row(page, "%s|%.4g ± %.2g|%.4g ± %.2g|%.4g ± %.2g|%+.2g %%, %+.2g %%|%+.2f|g = %g assumed%s%s",
-                         fitting->material.channel_names[c], o->absorption_per_mm, o->absorption_sd,
-                         o->reduced_scattering_per_mm, o->reduced_scattering_sd, o->reduced_albedo,
-                         o->reduced_albedo_sd, o->by_scale[0], o->by_scale[1], o->correlation, p->anisotropy,
-                         *flags ? "; " : "", flags);
-        else
-            alb_page_row(page, "%s|–|–|–|–|–|%s", fitting->material.channel_names[c],
-                         *p->refused ? p->refused : "not tried");
+        put_by_totals(page, fitting->material.channel_names[c], &fitting->properties[c]);
+        put_by_images(page, fitting->material.channel_names[c], &fitting->properties[c].images);
     }
     alb_page_end_table(page);
-    alb_page_paragraph(page, "By radiative transfer (adding-doubling) from the totals.");
+    alb_page_paragraph(page, "By radiative transfer: from the totals by adding-doubling; from the images, whose common "
+                             "factor is fitted, by spherical harmonics in Hankel space.");
 }
 
 static void put_readings(alb_page *page, const char *side, const char *channel, const alb_measurement *measurement)

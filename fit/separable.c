@@ -20,18 +20,18 @@
 #include <math.h>
 #include <string.h>
 
-enum { TERMS = ALB_TERMS_MAX, STARTS = 8 };
+enum { TERMS = ALB_TERMS_MAX, STARTS = 8, ROOM = 16 };
 
 // A second term that gains less has rivals among what the noise makes.
-static const double gain_without_rival = 20;
+static const double gain_without_rival = 60;
 
 typedef struct start {
     double merit, x[TERMS];
 } start;
 
 typedef struct starts {
-    int count;
-    start list[STARTS];
+    int count; // STARTS at most where the best are kept
+    start list[ROOM];
 } starts;
 
 typedef struct search {
@@ -77,7 +77,7 @@ static void polish(alb_place *best, search *s, const double *x, int terms, alb_s
 // the least chi^2 of the merged readings.
 static double descend(alb_place *best, search *s, const starts *from, int terms, alb_signs signs)
 {
-    alb_place places[STARTS];
+    alb_place places[ROOM];
     double least = (double)INFINITY;
     int count = 0;
     for (int k = 0; k < from->count; k++) {
@@ -165,6 +165,29 @@ static void cut(starts *out, const alb_measure *m, const search *s, int terms)
         }
 }
 
+// From the single exponential and a second term on rungs finer than the grid, and one that the nearest readings alone
+// see: where a second term gains next to nothing, the minima of chi^2 lie less than two steps of the grid apart.
+static void climb(alb_place *best, search *s, const alb_place *one)
+{
+    static const double rungs[] = {-3, -2.2, -1.6, -1.1, -0.7, -0.35, 0.35, 0.7, 1.1, 1.6, 2.2, 3};
+    alb_term *first = &s->merged.term[0], *second = &s->merged.term[1];
+    const double pivot = one->x[0], fastest = s->x[s->columns - 1];
+    starts from = {0};
+    alb_term_evaluate(first, &s->merged.data, pivot, s->merged.work);
+    for (size_t k = 0; k < sizeof rungs / sizeof rungs[0]; k++) {
+        const double x = pivot + rungs[k];
+        if (!(x > s->x[0] && x < fastest))
+            continue;
+        alb_term_evaluate(second, &s->merged.data, x, s->merged.work);
+        const double c = alb_columns_dot(first->column, second->column, s->merged.data.basis->rows);
+        const double a = second->cc * first->cv - c * second->cv, b = first->cc * second->cv - c * first->cv;
+        const double shift = a > 0 && b > 0 ? fmin(fmax(b / a * (pivot - x), -0.5), 0.5) : 0;
+        from.list[from.count++] = (start){0, {fmin(pivot + shift, x), fmax(pivot + shift, x)}};
+    }
+    descend(best, s, &from, 2, ALB_POSITIVE);
+    polish(best, s, (const double[TERMS]){pivot, fastest}, 2, ALB_POSITIVE);
+}
+
 // From the single exponential and a second term at each peak of what that gains, the first moved so that the mean
 // stays.
 static void polish_second(alb_place *best, search *s, const alb_place *one, alb_signs signs)
@@ -194,6 +217,8 @@ static void polish_second(alb_place *best, search *s, const alb_place *one, alb_
         keep(&from, (start){0, {pivot + 0.02, pivot + apart}});
     for (int k = 0; k < from.count; k++)
         polish(best, s, from.list[k].x, 2, signs);
+    if (signs == ALB_POSITIVE)
+        climb(best, s, one);
 }
 
 // No two or three terms come closer than the measure, but for the steps of the grid: where the first start leads as

@@ -1,6 +1,6 @@
 // Intervals of two exponentials: how often the 95 % interval covers the truth, against the Cramer-Rao bound of the
 // parameter, over noise x ratio of decays x ratio of amplitudes (tests/fit/pairs.h). Prints a table and draws the
-// chart: bench.coverage CHART.svg
+// chart: bench.fit_coverage CHART.svg
 //
 // Wald: value +- 1.96 sd by the covariance of the fit. Profile likelihood: of every fit of two terms, where no bound is
 // above 200 %. Stated: of those whose two terms alb_choose takes and calls identifiable, where it does so in half of
@@ -199,6 +199,6 @@ int main(int argc, char **argv)
     if (ok && argc > 1)
         ok = chart(&b, argv[1], &error);
     if (!ok)
-        fprintf(stderr, "bench.coverage: %s\n", error.text);
+        fprintf(stderr, "bench.fit_coverage: %s\n", error.text);
     return ok ? 0 : (int)error.status;
 }

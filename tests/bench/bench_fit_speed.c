@@ -1,5 +1,5 @@
 // Two exponentials fitted to random profiles of 120 readings (fit/exhaustive.h): how often the least chi-square there
-// is is missed, against time. Prints the rows and draws the chart: bench.fit CHART.svg [PROFILES]
+// is is missed, against time. Prints the rows and draws the chart: bench.fit_speed CHART.svg [PROFILES]
 //
 // Missed: chi-square more than 1e-6 of itself above the exhaustive minimum, over those profiles where a second term
 // lowers it at all. The separable fit gives covariance and the chi-square of one term besides (BIC); Ceres neither.
@@ -211,7 +211,7 @@ int main(int argc, char **argv)
     if (ok && argc > 1)
         ok = chart(&b, argv[1], &error);
     if (!ok)
-        fprintf(stderr, "bench.fit: %s\n", error.text);
+        fprintf(stderr, "bench.fit_speed: %s\n", error.text);
     free(b.scratch);
     alb_basis_free(&b.basis);
     alb_operator_free(&b.forward);
