@@ -46,7 +46,7 @@ static const alb_candidate candidates[ALB_ATTEMPTS_MAX] = {{ALB_FORM_EXPONENTIAL
                                                            {ALB_FORM_TWO_BURIED_SOURCES, false}};
 enum { ONE, TIED, TWO, SIGNED, FURTHER, LAST = ALB_ATTEMPTS_MAX - 1 };
 
-typedef struct fit {
+typedef struct alb_choice_fit {
     alb_profile profile;
     bool found;
     double chi_square;
@@ -264,40 +264,59 @@ static bool choose_with_discrepancy(int *chosen, fit fits[ALB_ATTEMPTS_MAX], dou
     return alb_discrepancy_widen(sd, &misfits[best], noise, error);
 }
 
-bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward, alb_common_sd common,
-                alb_error *error)
+void alb_choice_free(alb_choice *choice)
 {
-    bool ok = false;
-    int chosen;
-    alb_bases bases = {0};
-    fit fits[ALB_ATTEMPTS_MAX] = {{.found = false}};
+    alb_bases_free(&choice->bases);
+    free(choice->fits);
+    free(choice->sd);
+    *choice = (alb_choice){0};
+}
+
+bool alb_choice_by_noise(alb_choice *choice, alb_outcome *outcome, const alb_readings *readings,
+                         const alb_operator *forward, alb_common_sd common, alb_error *error)
+{
+    *choice = (alb_choice){.readings = readings, .forward = forward, .common = common, .chosen = -1};
     *outcome = (alb_outcome){0};
     if (readings->count < 3)
         return alb_fail(error, ALB_UNDECIDED, "%d readings do not decide between profiles; 3 at least",
                         readings->count);
-    double *sd = alb_allocate((size_t)readings->count, sizeof(double), error), energy_variance = 0;
-    if (!sd || !alb_basis_create(&bases.exponentials, readings, forward, error))
-        goto done;
-    memcpy(sd, readings->sd, (size_t)readings->count * sizeof(double));
-    for (int i = 0; i < readings->count; i++)
-        energy_variance += pow(readings->area_mm2[i] * readings->sd[i], 2);
-    const double energy_sd = hypot(sqrt(energy_variance), 1e-4 * fabs(alb_energy(readings, readings->value)));
-    alb_weighing weighing = {readings, forward, sd, 0};
-    if (!choose_by_noise(&chosen, fits, outcome, &bases, &weighing, error))
-        goto done;
+    const alb_weighing noise = {readings, forward, readings->sd, 0};
+    choice->fits = alb_allocate(ALB_ATTEMPTS_MAX, sizeof *choice->fits, error);
+    choice->sd = alb_allocate((size_t)readings->count, sizeof(double), error);
+    if (choice->fits && choice->sd && alb_basis_create(&choice->bases.exponentials, readings, forward, error) &&
+        choose_by_noise(&choice->chosen, choice->fits, outcome, &choice->bases, &noise, error))
+        return true;
+    alb_choice_free(choice);
+    return false;
+}
+
+bool alb_choice_complete(alb_choice *choice, alb_outcome *outcome, alb_error *error)
+{
+    const alb_readings *readings = choice->readings;
+    const double energy_sd = alb_energy_sd(readings);
+    const alb_weighing noise = {readings, choice->forward, readings->sd, 0};
+    alb_weighing weighing = noise;
+    int chosen = choice->chosen;
     if (chosen < 0) {
-        const alb_weighing noise = {readings, forward, readings->sd, 0};
-        if (!choose_with_discrepancy(&chosen, fits, sd, outcome, &bases, &noise, energy_sd, error))
-            goto done;
-        weighing.energy_sd = energy_sd;
+        if (!choose_with_discrepancy(&chosen, choice->fits, choice->sd, outcome, &choice->bases, &noise, energy_sd,
+                                     error))
+            return false;
+        weighing = (alb_weighing){readings, choice->forward, choice->sd, energy_sd};
     }
     for (int f = 0; f < outcome->attempt_count; f++)
         outcome->attempts[f].bic_excess = outcome->attempts[f].bic - outcome->attempts[chosen].bic;
-    outcome->fitted.profile = fits[chosen].profile;
+    outcome->fitted.profile = choice->fits[chosen].profile;
     outcome->tied = candidates[chosen].tied;
-    ok = alb_outcome_complete(outcome, candidates[chosen], &weighing, energy_sd, common, error);
-done:
-    alb_bases_free(&bases);
-    free(sd);
+    return alb_outcome_complete(outcome, candidates[chosen], &weighing, energy_sd, choice->common, error);
+}
+
+bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward, alb_common_sd common,
+                alb_error *error)
+{
+    alb_choice choice;
+    if (!alb_choice_by_noise(&choice, outcome, readings, forward, common, error))
+        return false;
+    const bool ok = alb_choice_complete(&choice, outcome, error);
+    alb_choice_free(&choice);
     return ok;
 }

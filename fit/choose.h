@@ -1,6 +1,6 @@
 // The simplest form that the noise does not reject, and what is known of it.
 #pragma once
-#include "fit/operator.h"
+#include "fit/form_search.h"
 #include "fit/sensitivity.h"
 #include "fit/uncertainty.h"
 
@@ -48,3 +48,22 @@ typedef struct alb_common_sd {
 // where the data do not decide between parameters it succeeds, with the best guess and the reason.
 bool alb_choose(alb_outcome *outcome, const alb_readings *readings, const alb_operator *forward, alb_common_sd common,
                 alb_error *error);
+
+// The same in two steps; the second is most of the work where no form stands against the noise. Borrows the readings
+// and the operator; free it after a first step that succeeded. Zero is empty.
+typedef struct alb_choice {
+    const alb_readings *readings;
+    const alb_operator *forward;
+    alb_common_sd common;
+    int chosen; // of outcome->attempts; -1: none stands against the noise
+    struct alb_choice_fit *fits;
+    double *sd;
+    alb_bases bases;
+} alb_choice;
+
+// What every form comes to by the noise, and which stands.
+bool alb_choice_by_noise(alb_choice *choice, alb_outcome *outcome, const alb_readings *readings,
+                         const alb_operator *forward, alb_common_sd common, alb_error *error);
+// The rest of the outcome, with a discrepancy where none stands.
+bool alb_choice_complete(alb_choice *choice, alb_outcome *outcome, alb_error *error);
+void alb_choice_free(alb_choice *choice);

@@ -207,6 +207,8 @@ void alb_material_put(alb_json *json, const alb_fitting *fitting)
         alb_json_number(json, "thickness_mm", material->thickness_mm);
     if (material->refractive_index > 0)
         alb_json_number(json, "refractive_index", material->refractive_index);
+    if (material->finish_known)
+        alb_json_string(json, "finish", alb_finish_names[material->finish]);
     alb_json_object(json, "channels");
     for (int c = 0; c < material->channels; c++) {
         alb_json_object(json, material->channel_names[c]);
@@ -229,6 +231,13 @@ bool alb_material_write(const alb_fitting *fitting, const alb_provenance *proven
     alb_json_begin(&json, provenance);
     alb_material_put(&json, fitting);
     return alb_json_write(&json, path, error);
+}
+
+alb_exit alb_material_exit(const alb_material *material, alb_side side)
+{
+    return material->finish_known && material->refractive_index >= 1
+               ? alb_exit_of(side, material->finish, material->refractive_index)
+               : (alb_exit){0};
 }
 
 static bool check_profile(const alb_profile *profile, alb_node node, alb_error *error)
@@ -326,7 +335,7 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
     alb_node root, channels, channel, side_node;
     const char *name;
     if (!alb_record_root(&root, record, error) ||
-        !alb_node_allow(root, "format provenance name thickness_mm refractive_index channels", error) ||
+        !alb_node_allow(root, "format provenance name thickness_mm refractive_index finish channels", error) ||
         !alb_node_text(&name, root, "name", error) || !alb_node_object(&channels, root, "channels", error))
         return false;
     if (strlen(name) >= ALB_NAME_SIZE)
@@ -335,8 +344,10 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
     if ((alb_node_has(root, "thickness_mm") &&
          !alb_node_number(&material->thickness_mm, root, "thickness_mm", 0, 1e6, error)) ||
         (alb_node_has(root, "refractive_index") &&
-         !alb_node_number(&material->refractive_index, root, "refractive_index", 1, 4, error)))
+         !alb_node_number(&material->refractive_index, root, "refractive_index", 1, 4, error)) ||
+        !alb_finish_read(&material->finish, root, error))
         return false;
+    material->finish_known = alb_node_has(root, "finish");
     const size_t count = alb_node_key_count(channels);
     if (count < 1 || count > 3)
         return alb_node_fail(error, root, "channels", "%zu channels; 1 to 3 are possible", count);

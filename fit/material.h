@@ -2,7 +2,8 @@
 // profile S(r): radiant exitance at distance r per unit incident flux, 1/mm^2.
 #pragma once
 #include "base/error.h"
-#include "capture/session.h" // alb_side
+#include "capture/session.h" // alb_side, alb_finish
+#include "fit/exit_angle.h"  // alb_exit: how light leaves a face
 
 enum { ALB_PARAMETERS_MAX = 6 };
 
@@ -63,12 +64,17 @@ typedef struct alb_optical_estimate {
 
 typedef struct alb_material {
     char name[ALB_NAME_SIZE];
-    double thickness_mm; // 0: not a slab or not known
-    double refractive_index;
+    double thickness_mm;     // 0: not a slab or not known
+    double refractive_index; // 0: not known
+    bool finish_known;
+    alb_finish finish; // of the faces
     int channels;
     char channel_names[3][8];
     alb_fitted fitted[ALB_SIDES][3];
     alb_optical_estimate optical[3];
 } alb_material;
+
+// How light leaves its faces: as Lambert says unless they are known to be smooth and of a known index.
+alb_exit alb_material_exit(const alb_material *material, alb_side side);
 
 bool alb_material_read(alb_material *material, const char *path, alb_error *error);

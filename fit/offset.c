@@ -106,15 +106,6 @@ static bool slow_term_is_flat(const alb_outcome *outcome, const alb_readings *re
            outcome->knowledge.parameters[1].upper * readings->outer_mm < 1;
 }
 
-// BIC of the form that was chosen; infinite where it does not stand.
-static double chosen_bic(const alb_outcome *outcome)
-{
-    for (int i = 0; outcome->discrepancy_relative == 0 && i < outcome->attempt_count; i++)
-        if (!*outcome->attempts[i].rejected)
-            return outcome->attempts[i].bic;
-    return INFINITY;
-}
-
 static double least_chi_square(const alb_outcome *outcome)
 {
     double least = INFINITY;
@@ -140,27 +131,44 @@ static bool take_off(alb_measurement *measurement, const shifted *best, alb_erro
     return alb_outcome_complete(outcome, candidate, &noise, 0, measurement->common, error);
 }
 
+// Beside the form that was chosen by the noise: whether one with a constant takes its place; where it is no worse, the
+// outcome says so.
+static bool displaces(const shifted *best, alb_outcome *outcome, const alb_attempt *chosen,
+                      const alb_readings *readings)
+{
+    if (!best->stands && !(best->bic < far_better * least_chi_square(outcome)))
+        return false;
+    const double excess = best->bic - chosen->bic;
+    if (excess < -decidedly || (!outcome->fitted.identifiable && excess <= 0 && slow_term_is_flat(outcome, readings)))
+        return true;
+    if (excess <= decidedly && fabs(best->offset) > 3 * best->offset_sd)
+        snprintf(outcome->offset_instead, sizeof outcome->offset_instead,
+                 "a constant of %.3g +- %.2g under %s would do as well (BIC %+.3g)", best->offset, best->offset_sd,
+                 alb_form_name(best->candidate.form), excess);
+    return false;
+}
+
+// A form beside a discrepancy is looked for only where none with a constant serves: most of the work, and in vain
+// otherwise.
 bool alb_offset_choose(alb_measurement *measurement, alb_error *error)
 {
     alb_outcome *outcome = &measurement->outcome;
     alb_error none = {0};
+    alb_choice choice;
     shifted best;
-    const bool chosen = alb_choose(outcome, &measurement->readings, &measurement->forward, measurement->common, &none);
-    if (!chosen && none.status != ALB_UNDECIDED)
-        return alb_fail(error, none.status, "%s", none.text);
-    if (!find_best(&best, measurement, error))
+    if (!alb_choice_by_noise(&choice, outcome, &measurement->readings, &measurement->forward, measurement->common,
+                             error))
         return false;
-    if (!chosen)
-        return isfinite(best.bic) ? take_off(measurement, &best, error) : alb_fail(error, none.status, "%s", none.text);
-    if (!best.stands && !(best.bic < far_better * least_chi_square(outcome)))
-        return true;
-    const double excess = best.bic - chosen_bic(outcome);
-    const bool stood = isfinite(excess), known = outcome->fitted.identifiable;
-    if (excess < -decidedly || (!known && excess <= 0 && slow_term_is_flat(outcome, &measurement->readings)))
-        return take_off(measurement, &best, error);
-    if (stood && excess <= decidedly && fabs(best.offset) > 3 * best.offset_sd)
-        snprintf(outcome->offset_instead, sizeof outcome->offset_instead,
-                 "a constant of %.3g +- %.2g under %s would do as well (BIC %+.3g)", best.offset, best.offset_sd,
-                 alb_form_name(best.candidate.form), excess);
-    return true;
+    bool ok = find_best(&best, measurement, error), take = false;
+    const bool stood = choice.chosen >= 0;
+    if (ok && !stood)
+        take = best.stands || best.bic < far_better * least_chi_square(outcome);
+    if (ok && !take && !alb_choice_complete(&choice, outcome, &none)) {
+        take = none.status == ALB_UNDECIDED && isfinite(best.bic);
+        ok = take || alb_fail(error, none.status, "%s", none.text);
+    } else if (ok && stood) {
+        take = displaces(&best, outcome, &outcome->attempts[choice.chosen], &measurement->readings);
+    }
+    alb_choice_free(&choice);
+    return ok && (!take || take_off(measurement, &best, error));
 }

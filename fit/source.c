@@ -236,6 +236,8 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_map *map, alb_provenance
         memcpy(material->name, calibration->sample, sizeof material->name);
         material->thickness_mm = calibration->thickness_mm;
         material->refractive_index = calibration->refractive_index;
+        material->finish_known = true;
+        material->finish = calibration->finish;
         fitting->basis.finish = calibration->finish;
         fitting->basis.own_sd = calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0;
         material->channels = calibration->channels;

@@ -51,17 +51,6 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// The brightest radiance of what does not emit: lamps and sky may be brighter and are not what a picture is of.
-static double brightest_lit(const alb_solution *s)
-{
-    double brightest = 0;
-    for (size_t p = 0; p < s->patches.count; p++)
-        for (int c = 0; c < 3; c++)
-            if (!(s->exitance[p][0] + s->exitance[p][1] + s->exitance[p][2] > 0))
-                brightest = fmax(brightest, s->radiosity[p][c] / M_PI);
-    return brightest;
-}
-
 // Exposure that shows the 99th percentile of the lit pixels' largest channel at 0.9, lamps and sky left out.
 static bool auto_exposure(double *exposure, const alb_image *picture, double brightest, alb_error *error)
 {
@@ -193,23 +182,19 @@ static bool render(const outputs *out, alb_scene *scene, alb_provenance *provena
 {
     alb_solution solution = {0};
     alb_image picture = {0};
-    float(*corners)[3][3] = NULL;
     double exposure = 1;
     bool ok = false;
-    if (!alb_solution_create(&solution, scene, error) ||
-        !(corners = alb_allocate(solution.patches.count, sizeof *corners, error)))
+    if (!alb_solution_create(&solution, scene, error))
         goto done;
     warn(scene, &solution);
     const double start_s = alb_clock_s();
-    if (!alb_view_smooth(corners, &solution.patches, (const double(*)[3])solution.radiosity, error) ||
-        !alb_view_render(&picture, scene, &solution.tracer, (const float(*)[3][3])corners, error))
+    if (!alb_view_render(&picture, scene, &solution, error))
         goto done;
     const double view_s = alb_clock_s() - start_s;
-    ok = write_picture(out, &picture, brightest_lit(&solution), provenance, &exposure, error) &&
+    ok = write_picture(out, &picture, alb_view_brightest(scene, &solution), provenance, &exposure, error) &&
          (!out->mesh || write_mesh(out->mesh, &solution, provenance, error)) &&
          report(out, scene, &solution, view_s, exposure, error);
 done:
-    free(corners);
     alb_image_free(&picture);
     alb_solution_free(&solution);
     return ok;

@@ -154,6 +154,33 @@ void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const doubl
     }
 }
 
+// Light on one face, seen from the other.
+bool alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3],
+                              alb_error *error)
+{
+    const size_t n = scatter->patch_count;
+    double(*lit)[3] = alb_allocate(n, sizeof *lit, error), (*sent)[3] = alb_allocate(n, sizeof *sent, error);
+    memset(out, 0, n * sizeof *out);
+    for (int run = 0; lit && sent && run < 3; run += 2) {
+        memset(lit, 0, n * sizeof *lit);
+        for (size_t b = 0; b < scatter->body_count; b++) {
+            const alb_scatter_body *body = &scatter->bodies[b];
+            for (size_t i = body->sources.starts[run]; i < body->sources.starts[run + 1]; i++)
+                memcpy(lit[body->patches[i]], irradiance[body->patches[i]], sizeof *lit);
+        }
+        alb_scatter_apply(sent, scatter, (const double(*)[3])lit);
+        for (size_t b = 0; b < scatter->body_count; b++) {
+            const alb_scatter_body *body = &scatter->bodies[b];
+            for (size_t i = body->sources.starts[2 - run]; i < body->sources.starts[3 - run]; i++)
+                memcpy(out[body->patches[i]], sent[body->patches[i]], sizeof *out);
+        }
+    }
+    const bool ok = lit && sent;
+    free(lit);
+    free(sent);
+    return ok;
+}
+
 static size_t sources_bytes(const alb_sources *sources)
 {
     return sources->starts[3] * (5 * sizeof(float) + sizeof *sources->amounts);

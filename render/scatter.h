@@ -9,7 +9,8 @@ typedef struct alb_surface {
     bool scatters;         // else opaque and diffuse
     bool slab;             // scatters as a slab: reflection on one face, transmission between the two; else as a solid
     double reflectance[3]; // opaque
-    double exitance[3];    // emitted, per area
+    alb_exit exits[ALB_SIDES];          // which way light leaves, reflected and through a slab; zero: as Lambert says
+    double exitance[3];                 // emitted, per area
     alb_profile profiles[ALB_SIDES][3]; // RGB; transmission for slabs only
 } alb_surface;
 
@@ -58,6 +59,9 @@ bool alb_scatter_create(alb_scatter *scatter, const alb_patches *patches, const 
 void alb_scatter_free(alb_scatter *scatter);
 // out = S' irradiance, RGB; out and irradiance have patch_count rows and are not the same.
 void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
+// The part of S' irradiance that crossed a slab: zero elsewhere. Same rows. Fails for want of memory alone.
+bool alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3],
+                              alb_error *error);
 size_t alb_scatter_bytes(const alb_scatter *scatter);
 
 // Tables over 0 .. end_mm; that of P is left out where it would be wrong by more than 1e-6 of P.

@@ -9,7 +9,7 @@
 //    "materials": {"wall": {"reflectance": [r,g,b]}, "lamp": {"reflectance": [..], "exitance": [..]},
 //                  "wax": {"measured": "wax/material.json", "path": "slab" | "solid"},
 //                  "marble": {"dipole": {"absorption_per_mm": [..], "reduced_scattering_per_mm": [..],
-//                                        "refractive_index": 1.5}}},
+//                                        "refractive_index": 1.5, "finish": "smooth" | "ground"}}},
 //    "lights": [{"kind": "point", "position_mm": [..], "flux": [..]},
 //               {"kind": "spot", "position_mm": [..], "direction": [..], "half_angle_deg": 10, "flux": [..]},
 //               {"kind": "projector", "centre_mm": [..], "direction": [..], "blur_sd_mm": 0.1, "flux": [..],
@@ -19,9 +19,10 @@
 //              {"position_mm": [..], "look_at_mm": [..], "up": [0,1,0], "vertical_field_deg": 40,
 //               "width": 640, "height": 480},
 //    "rays_per_patch": 256, "residual": 1e-4, "seed": 1}
-// mm_per_unit 1, translate_mm 0, subdivide_mm none, grading 1, inward false, path "solid", blur_sd_mm 0, lights none,
-// rays_per_patch 256, residual 1e-4 and seed 1 are what stands where nothing is written. Paths are relative to the
-// file. Units are the user's as long as they agree: flux 1 makes the picture radiance per incident flux, 1/(mm^2 sr).
+// mm_per_unit 1, translate_mm 0, subdivide_mm none, grading 1, inward false, path "solid", blur_sd_mm 0, finish
+// "smooth", lights none, rays_per_patch 256, residual 1e-4 and seed 1 are what stands where nothing is written. Paths
+// are relative to the file. Units are the user's as long as they agree: flux 1 makes the picture radiance per incident
+// flux, 1/(mm^2 sr).
 #pragma once
 #include "base/camera.h"
 #include "base/json.h"

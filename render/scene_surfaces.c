@@ -32,6 +32,8 @@ static bool read_measured(alb_surface *surface, alb_scene_reader *in, alb_node n
         !alb_material_read(&material, path, in->error) || !read_slab_path(&surface->slab, node, in->error))
         return false;
     surface->scatters = true;
+    for (int side = 0; side < ALB_SIDES; side++)
+        surface->exits[side] = alb_material_exit(&material, (alb_side)side);
     for (int side = 0; side <= (surface->slab ? ALB_TRANSMISSION : ALB_REFLECTION); side++)
         for (int c = 0; c < 3; c++) {
             const alb_profile *profile = profile_of(&material, (alb_side)side, c);
@@ -48,13 +50,15 @@ static bool read_dipole(alb_surface *surface, alb_node node, alb_error *error)
 {
     alb_node dipole;
     double absorption[3], scattering[3], index;
+    alb_finish finish;
     if (!alb_node_allow(node, "dipole", error) || !alb_node_object(&dipole, node, "dipole", error) ||
-        !alb_node_allow(dipole, "absorption_per_mm reduced_scattering_per_mm refractive_index", error) ||
+        !alb_node_allow(dipole, "absorption_per_mm reduced_scattering_per_mm refractive_index finish", error) ||
         !alb_node_numbers(absorption, 3, dipole, "absorption_per_mm", 1e-9, 1e4, error) ||
         !alb_node_numbers(scattering, 3, dipole, "reduced_scattering_per_mm", 1e-9, 1e4, error) ||
-        !alb_node_number(&index, dipole, "refractive_index", 1, 3, error))
+        !alb_node_number(&index, dipole, "refractive_index", 1, 3, error) || !alb_finish_read(&finish, dipole, error))
         return false;
     surface->scatters = true;
+    surface->exits[ALB_REFLECTION] = alb_exit_of(ALB_REFLECTION, finish, index);
     for (int c = 0; c < 3; c++)
         surface->profiles[ALB_REFLECTION][c] =
             (alb_profile){.form = ALB_FORM_DIPOLE, .parameters = {absorption[c], scattering[c], index}};

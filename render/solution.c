@@ -42,30 +42,50 @@ static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *
     return alb_radiosity_check(&s->row_sum, &s->scatter, closed, scene->mesh.groups, scene->surfaces, error);
 }
 
-static bool take_balance(alb_solution *s, alb_error *error)
+static void take_balance(alb_solution *s, const double (*irradiance)[3])
 {
     const size_t n = s->patches.count, rays = (size_t)s->factors.rays;
-    double(*gathered)[3] = alb_allocate(n, sizeof *gathered, error);
     const double(*kept)[3] = (const double(*)[3])s->scatter.column_sums;
-    const bool ok = gathered != NULL;
-    if (ok)
-        alb_form_factors_apply(gathered, &s->factors, (const double(*)[3])s->radiosity);
-    for (size_t p = 0; ok && p < n; p++) {
+    for (size_t p = 0; p < n; p++) {
         size_t sky = 0, back = 0;
         for (size_t q = 0; q < rays; q++) {
             sky += s->factors.hits[p * rays + q] == n;
             back += s->factors.hits[p * rays + q] == n + 1;
         }
         for (int c = 0; c < 3; c++) {
-            const double area = s->patches.areas_mm2[p], irradiance = s->irradiance[p][c] + gathered[p][c];
+            const double area = s->patches.areas_mm2[p];
             s->column_sum = fmax(s->column_sum, kept[p][c]);
             s->balance.in[c] += area * (s->irradiance[p][c] + (s->lamps_direct ? 0 : s->exitance[p][c]));
-            s->balance.absorbed[c] += area * (1 - kept[p][c]) * irradiance;
+            s->balance.absorbed[c] += area * (1 - kept[p][c]) * irradiance[p][c];
             s->balance.escaped[c] += area * s->radiosity[p][c] * (double)sky / (double)rays;
             s->balance.lost[c] += area * s->radiosity[p][c] * (double)back / (double)rays;
         }
     }
-    free(gathered);
+}
+
+// What leaves a smooth slab on the far side leaves in other directions than what is reflected.
+static bool take_across(alb_solution *s, const alb_scene *scene, const double (*irradiance)[3], alb_error *error)
+{
+    bool wanted = false;
+    for (size_t i = 0; i < scene->surface_count; i++)
+        wanted |= scene->surfaces[i].slab && scene->surfaces[i].exits[ALB_TRANSMISSION].smooth;
+    return !wanted || ((s->across = alb_allocate(s->patches.count, sizeof *s->across, error)) &&
+                       alb_scatter_apply_across(s->across, &s->scatter, irradiance, error));
+}
+
+// What the whole irradiance H = E + F B says.
+static bool take_irradiance(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    double(*irradiance)[3] = alb_allocate(s->patches.count, sizeof *irradiance, error);
+    if (!irradiance)
+        return false;
+    alb_form_factors_apply(irradiance, &s->factors, (const double(*)[3])s->radiosity);
+    for (size_t p = 0; p < s->patches.count; p++)
+        for (int c = 0; c < 3; c++)
+            irradiance[p][c] += s->irradiance[p][c];
+    take_balance(s, (const double(*)[3])irradiance);
+    const bool ok = take_across(s, scene, (const double(*)[3])irradiance, error);
+    free(irradiance);
     return ok;
 }
 
@@ -80,7 +100,7 @@ static bool solve(alb_solution *s, const alb_scene *scene, alb_error *error)
         emitted &&
         alb_radiosity_solve(s->radiosity, &s->report, (const double(*)[3])s->irradiance, (const double(*)[3])emitted,
                             &s->scatter, &s->factors, s->patches.areas_mm2, scene->residual, error) &&
-        take_balance(s, error);
+        take_irradiance(s, scene, error);
     free(emitted);
     for (size_t p = 0; ok && s->lamps_direct && p < n; p++)
         for (int c = 0; c < 3; c++)
@@ -137,5 +157,6 @@ void alb_solution_free(alb_solution *solution)
     free(solution->irradiance);
     free(solution->exitance);
     free(solution->radiosity);
+    free(solution->across);
     *solution = (alb_solution){0};
 }

@@ -32,6 +32,7 @@ typedef struct alb_solution {
     double (*exitance)[3];   // emitted by lamps
     bool lamps_direct;       // small lamps: their light is in the irradiance
     double (*radiosity)[3];  // all that leaves
+    double (*across)[3];     // the part of it that crossed a slab with smooth faces; NULL where there is none
     alb_radiosity_report report;
     double row_sum, column_sum; // largest of S'
     alb_balance balance;

@@ -132,6 +132,7 @@ static void damaged(void **state)
     check_replaced("\"total\": {\n          \"value\": ", "\"total\": {\n          \"value\": 1",
                    "does not belong to the parameters");
     check_replaced("\"channels\"", "\"colour\": 1, \"channels\"", "unknown key");
+    check_replaced("\"channels\"", "\"finish\": \"shiny\", \"channels\"", "found \"shiny\"");
     check_replaced("\"format\": 1", "\"format\": 2", "format");
     check_replaced("\"covariance\": [", "\"covariance\": [[1, 1, 1, 1], ", "5 rows for 4");
     alb_fitting_free(fitting);

@@ -380,10 +380,7 @@ static void threads_do_not_matter(void **state)
         scene.lights[1] = (alb_light){.kind = ALB_LIGHT_POINT, .position_mm = {20, 20, 20}, .flux = {1, 2, 1}};
         scene.camera = alb_camera_look_at((alb_vector){0, -28, 5}, (alb_vector){0}, (alb_vector){0, 0, 1}, 60, 80, 60);
         check_ok(alb_solution_create(&s, &scene, &error), &error);
-        float(*corners)[3][3] = calloc(s.patches.count, sizeof *corners);
-        check_ok(alb_view_smooth(corners, &s.patches, (const double(*)[3])s.radiosity, &error), &error);
-        check_ok(alb_view_render(&pictures[k], &scene, &s.tracer, (const float(*)[3][3])corners, &error), &error);
-        free(corners);
+        check_ok(alb_view_render(&pictures[k], &scene, &s, &error), &error);
         alb_solution_free(&s);
         alb_scene_free(&scene);
     }

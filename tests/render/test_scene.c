@@ -174,6 +174,49 @@ static void a_measured_slab_gives_its_profile_back(void **state)
     alb_image_free(&picture);
 }
 
+// Light leaves a face by Fresnel's law where the material says that it is smooth and of which index; else by Lambert's.
+static void the_finish_decides_the_directions(void **state)
+{
+    (void)state;
+    static const char measured[] = "{\"format\":1," BOX "," WAX "," CAMERA "}";
+    static const char *const said[] = {"\"refractive_index\": 1.5, \"finish\": \"smooth\",",
+                                       "\"refractive_index\": 1.5, \"finish\": \"ground\",",
+                                       "\"refractive_index\": 1.5,", "\"finish\": \"smooth\",", ""};
+    for (int k = 0; k < 5; k++) {
+        alb_error error = {0};
+        alb_scene scene;
+        char *bytes, *at;
+        size_t size;
+        alb_text text = {0};
+        write_material(0.015, 0.4, 0.003);
+        check_ok(alb_file_read(&bytes, &size, "test_scene_material.json", &error), &error);
+        assert_non_null(at = strstr(bytes, "\"channels\""));
+        alb_text_add_bytes(&text, bytes, (size_t)(at - bytes));
+        alb_text_add(&text, "%s%s", said[k], at);
+        check_ok(alb_file_write_text("test_scene_material.json", &text, &error), &error);
+        check_ok(read_text(&scene, measured, &error), &error);
+        for (int side = 0; side < ALB_SIDES; side++) {
+            assert_int_equal(scene.surfaces[0].exits[side].smooth, k == 0);
+            assert_int_equal(scene.surfaces[0].exits[side].side, k < 2 ? side : 0);
+        }
+        alb_scene_free(&scene);
+        alb_text_free(&text);
+        free(bytes);
+    }
+    for (int k = 0; k < 3; k++) {
+        alb_error error = {0};
+        alb_scene scene;
+        char dipole[1024];
+        snprintf(dipole, sizeof dipole,
+                 "{\"format\":1,%s,\"materials\":{\"m\":{\"dipole\":{\"absorption_per_mm\":[1,1,1],"
+                 "\"reduced_scattering_per_mm\":[1,1,1],\"refractive_index\":1.5%s}}},%s}",
+                 BOX, (const char *[]){"", ",\"finish\":\"smooth\"", ",\"finish\":\"ground\""}[k], CAMERA);
+        check_ok(read_text(&scene, dipole, &error), &error);
+        assert_int_equal(scene.surfaces[0].exits[ALB_REFLECTION].smooth, k < 2);
+        alb_scene_free(&scene);
+    }
+}
+
 // A render that is refused leaves what an earlier one wrote.
 static void a_refused_scene_leaves_earlier_results(void **state)
 {
@@ -197,6 +240,7 @@ int main(void)
         cmocka_unit_test(reads_a_scene),
         cmocka_unit_test(refuses_what_is_wrong),
         cmocka_unit_test(a_measured_slab_gives_its_profile_back),
+        cmocka_unit_test(the_finish_decides_the_directions),
         cmocka_unit_test(a_refused_scene_leaves_earlier_results),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
