@@ -4,7 +4,8 @@
 // sees the face from (exit_angle.c), which is 1 % uncertain for a smooth face and common to a side's readings, and less
 // where both sides say what the slab is made of (exit_correct.c). The
 // image of the spot on the white reference serves both sides: it is the light that enters the front. Images given by
-// hand keep their unit; what saturates (integers at full scale) and what is not finite counts as not measured.
+// hand keep their unit; what saturates (integers at full scale) and what is not finite, or has no variance of zero or
+// more beside it where there is a channel of them, counts as not measured.
 #include "fit/source.h"
 #include "base/image.h"
 #include "base/memory.h"
@@ -44,9 +45,10 @@ bool alb_plane_take(alb_plane *out, const alb_image *image, const char *channel,
         const float *pixel = image->pixels + i * (size_t)image->channels;
         const double value = (double)pixel[c];
         const double f = factor ? factor[i] : 1;
-        out->value[i] = isfinite(value) && value < saturation ? f * value : (double)NAN;
+        const bool known = v < 0 || (pixel[v] >= 0 && isfinite(pixel[v]));
+        out->value[i] = isfinite(value) && value < saturation && known ? f * value : (double)NAN;
         if (v >= 0)
-            out->variance[i] = f * f * (double)pixel[v];
+            out->variance[i] = known ? f * f * (double)pixel[v] : 0;
     }
     return true;
 }
