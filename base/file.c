@@ -13,13 +13,18 @@
 #include <unistd.h>
 
 // What a signal handler removes. The one piece of global state: a handler can be told nothing else. Several threads may
-// each have a file under way; one beyond the table is written all the same, but an interrupt would leave it.
-enum { PENDING_MAX = 16 };
+// each have a file under way; one beyond the table is written all the same, but an interrupt would leave it. Where
+// files are gathered, they stay in the table until all are renamed, and an interrupt waits for that.
+enum { PENDING_MAX = 64 };
 static char pending[PENDING_MAX][ALB_PATH_SIZE];
-static volatile sig_atomic_t pending_set[PENDING_MAX];
+static volatile sig_atomic_t pending_set[PENDING_MAX], gathering, settling, waiting_signal;
 
 static void remove_pending(int signal_number)
 {
+    if (settling) {
+        waiting_signal = signal_number;
+        return;
+    }
     for (int i = 0; i < PENDING_MAX; i++)
         if (pending_set[i])
             unlink(pending[i]);
@@ -52,6 +57,15 @@ static void guard(const char *temporary)
             pending_set[slot] = 1;
         }
     }
+}
+
+static bool guarded(const char *temporary)
+{
+    bool found = false;
+#pragma omp critical(alb_file_pending)
+    for (int i = 0; i < PENDING_MAX; i++)
+        found |= pending_set[i] && !strcmp(pending[i], temporary);
+    return found;
 }
 
 static void unguard(const char *temporary)
@@ -137,6 +151,12 @@ bool alb_file_check_target(const char *path, alb_error *error)
     return true;
 }
 
+bool alb_file_same(const char *a, const char *b)
+{
+    struct stat one, other;
+    return !stat(a, &one) && !stat(b, &other) && one.st_dev == other.st_dev && one.st_ino == other.st_ino;
+}
+
 bool alb_file_begin(char temporary[ALB_PATH_SIZE], const char *path, alb_error *error)
 {
     if (!alb_file_check_target(path, error))
@@ -150,6 +170,8 @@ bool alb_file_begin(char temporary[ALB_PATH_SIZE], const char *path, alb_error *
 
 bool alb_file_commit(const char *temporary, const char *path, alb_error *error)
 {
+    if (gathering && guarded(temporary))
+        return true;
     if (rename(temporary, path)) {
         const int reason = errno;
         alb_file_abandon(temporary);
@@ -163,6 +185,30 @@ void alb_file_abandon(const char *temporary)
 {
     unlink(temporary);
     unguard(temporary);
+}
+
+void alb_files_gather(void) { gathering = 1; }
+
+bool alb_files_settle(bool keep, alb_error *error)
+{
+    char path[ALB_PATH_SIZE], suffix[32];
+    const size_t cut = (size_t)snprintf(suffix, sizeof suffix, ".%ld.tmp", (long)getpid());
+    bool ok = true;
+    gathering = 0;
+    settling = 1;
+    for (int i = 0; i < PENDING_MAX; i++) {
+        if (!pending_set[i])
+            continue;
+        snprintf(path, sizeof path, "%.*s", (int)(strlen(pending[i]) - cut), pending[i]);
+        if (keep && ok)
+            ok = alb_file_commit(pending[i], path, error);
+        else
+            alb_file_abandon(pending[i]);
+    }
+    settling = 0;
+    if (waiting_signal)
+        remove_pending(waiting_signal);
+    return ok;
 }
 
 bool alb_file_write(const char *path, const void *bytes, size_t size, alb_error *error)

@@ -18,11 +18,18 @@ bool alb_file_write_text(const char *path, const alb_text *text, alb_error *erro
 // Whether a file could be written there, before the work that makes it: its folder exists and takes files, and what
 // stands at `path` now, if anything, is an ordinary file (a folder or a device is never replaced).
 bool alb_file_check_target(const char *path, alb_error *error);
+// Whether both paths lead to one file that is there.
+bool alb_file_same(const char *a, const char *b);
 // For libraries that write a file themselves: choose the temporary name, then commit (rename) or abandon (remove) it.
-// An interrupt (SIGINT, SIGTERM, SIGHUP) removes the temporary files that are under way, 16 of them at most.
+// An interrupt (SIGINT, SIGTERM, SIGHUP) removes the temporary files that are under way, 64 of them at most.
 bool alb_file_begin(char temporary[ALB_PATH_SIZE], const char *path, alb_error *error);
 bool alb_file_commit(const char *temporary, const char *path, alb_error *error);
 void alb_file_abandon(const char *temporary);
+// For results that belong together: what is written between the two calls stays under its temporary name (64 files at
+// most; more are renamed at once), then all of it is renamed or, where `keep` is false, removed. A full disk or an
+// interrupt before that leaves what stood there.
+void alb_files_gather(void);
+bool alb_files_settle(bool keep, alb_error *error);
 // Makes the directory and its parents; an existing one is fine.
 bool alb_file_make_directory(const char *path, alb_error *error);
 // "a/b" from "a" and "b"; b alone when it is absolute or a is empty. Empty where it fails.

@@ -180,13 +180,14 @@ bool alb_appearance_derive(alb_appearance *appearance, const alb_material *mater
         if (reflection->profile.form == ALB_FORM_NONE)
             return alb_fail(error, ALB_BAD_DATA,
                             "%s: channel %s has no reflection, which a renderer wants; csv takes either side",
-                            material->name, material->channel_names[c]);
+                            *material->name ? material->name : "the material", material->channel_names[c]);
         const bool black = is_dipole(&reflection->profile) && reflection->profile.parameters[0] > 0;
         if (!(black || reflection->total > 0) || !(reflection->total <= 1 + 1e-9))
             return alb_fail(error, ALB_BAD_DATA,
                             "%s: channel %s reflects %.4g of the light, which no renderer takes: fit a calibrated "
                             "session, whose scale is absolute; csv takes any scale",
-                            material->name, material->channel_names[c], reflection->total);
+                            *material->name ? material->name : "the material", material->channel_names[c],
+                            reflection->total);
         out->burley.albedo = fmin(reflection->total, 1);
         out->albedo_sd = reflection->identifiable ? reflection->total_sd : (double)NAN;
         if (out->burley.albedo > 0)

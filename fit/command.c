@@ -234,10 +234,13 @@ static bool write_results(const alb_fitting *fitting, const alb_map *map, const 
                           const alb_text *notes, const request *r, alb_error *error)
 {
     const char *said = notes->bytes ? notes->bytes : "";
-    if (!alb_file_make_directory(r->out, error) ||
-        !(map->columns ? alb_map_write(map, fitting, provenance, said, r->out, error)
-                       : alb_fitting_report(fitting, provenance, said, r->out, error)) ||
-        !alb_material_write(fitting, provenance, r->out, error))
+    if (!alb_file_make_directory(r->out, error))
+        return false;
+    alb_files_gather();
+    const bool written = (map->columns ? alb_map_write(map, fitting, provenance, said, r->out, error)
+                                       : alb_fitting_report(fitting, provenance, said, r->out, error)) &&
+                         alb_material_write(fitting, provenance, r->out, error);
+    if (!alb_files_settle(written, error) || !written)
         return false;
     if (r->as_json) {
         alb_json json;

@@ -34,11 +34,20 @@ static void make_identifier(char identifier[ALB_NAME_SIZE], const char *name)
         *identifier = '_';
 }
 
+// A file's name may hold anything but '/': no line of it ends a comment, nor does "--", which XML's do not hold.
+static void keep_in_comment(char *text)
+{
+    for (char *at = text; *at; at++)
+        if ((unsigned char)*at < ' ' || *at == 127 || (at > text && *at == '-' && at[-1] == '-'))
+            *at = '_';
+}
+
 bool alb_export_prepare(alb_export *exported, const alb_exporter *exporter, const alb_material *material,
                         const char *path, double unit_mm, alb_error *error)
 {
     *exported = (alb_export){.material = material, .unit_mm = unit_mm};
     snprintf(exported->source, sizeof exported->source, "%.255s", alb_path_name(path));
+    keep_in_comment(exported->source);
     make_identifier(exported->identifier, material->name);
     if (!alb_hash_file(exported->sha256, path, error))
         return false;

@@ -72,13 +72,14 @@ static bool run(int argc, char **argv, alb_error *error)
         return alb_fail(error, ALB_USAGE, "--to %.40s: 'alabaster help export' lists the formats", format);
     if (unit && !exporter->wants_appearance)
         return alb_fail(error, ALB_USAGE, "--unit-mm does not go with --to %s, which is in millimetres", format);
+    if (alb_file_same(path, out))
+        return alb_fail(error, ALB_USAGE, "-o %s is the material itself; give the export a name of its own", out);
     alb_provenance provenance = {.command = "export"};
     snprintf(provenance.options, sizeof provenance.options, "--to %s --unit-mm %.9g", format, unit_mm);
     alb_material material;
     alb_export exported;
     alb_text text = {0};
     bool ok = alb_file_check_target(out, error) && alb_material_read(&material, path, error) &&
-
               alb_export_prepare(&exported, exporter, &material, path, unit_mm, error) &&
               alb_provenance_add(&provenance, path, error);
     if (ok) {

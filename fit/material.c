@@ -33,12 +33,30 @@ static void find_images(alb_fitting *fitting)
         for (int side = 0; side < ALB_SIDES; side++)
             if (fitting->sides[side][c].measured)
                 sides[side] = (alb_joint_side){&fitting->sides[side][c].readings, &fitting->sides[side][c].forward};
-        const alb_joint_known known = {fitting->material.thickness_mm,   fitting->material.refractive_index,
-                                       fitting->basis.anisotropy,        anisotropy_sd,
-                                       fitting->sides[0][c].common.flux, M_SQRT2 * fitting->basis.own_sd};
+        const alb_joint_known known = {
+            fitting->material.thickness_mm,   fitting->material.refractive_index,
+            fitting->basis.anisotropy,        anisotropy_sd,
+            fitting->sides[0][c].common.flux, hypot(fitting->basis.own_sd[0][c], fitting->basis.own_sd[1][c])};
         if (sides[ALB_REFLECTION].readings && sides[ALB_TRANSMISSION].readings)
             alb_image_properties_find(&fitting->properties[c].images, sides, &known);
     }
+}
+
+// What is not a round spot is not decided, whatever the noise makes of a curve through it: more than a third of the
+// pixels left out, or the best form a factor of two off.
+static void doubt(alb_outcome *outcome, const alb_readings *readings)
+{
+    if (!outcome->fitted.identifiable)
+        return;
+    if (2 * readings->glints > readings->pixels)
+        snprintf(outcome->undecided, sizeof outcome->undecided,
+                 "%ld of %ld pixels had to be left out as glints, dust or veins: the light is not that of a round spot",
+                 readings->glints, readings->pixels + readings->glints);
+    else if (outcome->discrepancy_relative > 1)
+        snprintf(outcome->undecided, sizeof outcome->undecided,
+                 "no form comes nearer to the readings than %.2g %%: this is not the light of a spot",
+                 100 * outcome->discrepancy_relative);
+    outcome->fitted.identifiable = !*outcome->undecided;
 }
 
 bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
@@ -53,6 +71,8 @@ bool alb_fitting_run(alb_fitting *fitting, alb_error *error)
             alb_offset_choose(measurement, &reasons[i]) &&
             (i / 3 != ALB_TRANSMISSION || alb_ballistic_find(&measurement->outcome, &measurement->readings,
                                                              &measurement->forward, measurement->common, &reasons[i]));
+        if (measurement->measured)
+            doubt(&measurement->outcome, &measurement->readings);
     }
     for (int i = 0; i < ALB_SIDES * 3; i++)
         if (reasons[i].status != ALB_OK)
@@ -230,6 +250,20 @@ static bool check_profile(const alb_profile *profile, alb_node node, alb_error *
                          alb_form_name(profile->form), p[0], p[1], p[2], p[3], p[4], p[5]);
 }
 
+// No variance below zero, and no two parameters correlated by more than 1.
+static bool check_covariance(const alb_fitted *fitted, int n, alb_node node, alb_error *error)
+{
+    for (int p = 0; p < n; p++)
+        for (int q = 0; q <= p; q++) {
+            const double here = fitted->covariance[p][q], there = fitted->covariance[q][p],
+                         most = sqrt(fitted->covariance[p][p]) * sqrt(fitted->covariance[q][q]);
+            if (!(fabs(here) <= most * (1 + 1e-6)) || !(fabs(here - there) <= most * 1e-6))
+                return alb_node_fail(error, node, "covariance", "rows %d and %d do not make a covariance (%g and %g)",
+                                     q + 1, p + 1, here, there);
+        }
+    return true;
+}
+
 static const char estimate_keys[] = "value sd interval_95 cramer_rao_sd identifiable because";
 
 static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
@@ -260,7 +294,7 @@ static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
     for (size_t p = 0; p < row_count; p++)
         if (!alb_node_item_numbers(fitted->covariance[p], row_count, rows, p, -1e300, 1e300, error))
             return false;
-    return true;
+    return check_covariance(fitted, n, node, error);
 }
 
 static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
@@ -294,6 +328,9 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
     return true;
 }
 
+// Names go into other programs' files as they are.
+static const char name_characters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.";
+
 static bool read_material(alb_material *material, const alb_record *record, alb_error *error)
 {
     alb_node root, channels, channel, side_node;
@@ -316,10 +353,11 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
     if (count < 1 || count > 3)
         return alb_node_fail(error, root, "channels", "%zu channels; 1 to 3 are possible", count);
     material->channels = (int)count;
+    bool measured = false;
     for (size_t c = 0; c < count; c++) {
         const char *key = alb_node_key(channels, c);
-        if (strlen(key) >= sizeof material->channel_names[0])
-            return alb_node_fail(error, channels, key, "name longer than 7 characters");
+        if (!*key || strlen(key) >= sizeof material->channel_names[0] || strspn(key, name_characters) < strlen(key))
+            return alb_node_fail(error, channels, key, "a channel's name is 1 to 7 letters, digits, '_' and '.'");
         snprintf(material->channel_names[c], sizeof material->channel_names[0], "%s", key);
         if (!alb_node_object(&channel, channels, key, error) ||
             !alb_node_allow(channel, "reflection transmission optical_properties", error) ||
@@ -330,8 +368,9 @@ static bool read_material(alb_material *material, const alb_record *record, alb_
                 (!alb_node_object(&side_node, channel, alb_side_names[side], error) ||
                  !read_fitted(&material->fitted[side][c], side_node, error)))
                 return false;
+        measured |= alb_node_key_count(channel) > alb_node_has(channel, "optical_properties");
     }
-    return true;
+    return measured || alb_node_fail(error, root, "channels", "no profile of either side in any of them");
 }
 
 bool alb_material_read(alb_material *material, const char *path, alb_error *error)

@@ -1,5 +1,6 @@
 // What a machine and its user can do to a running program: devices and folders in the way, full disks, closed streams,
 // a second capture, names that are not text, numbers that overflow.
+#include "base/exr.h"
 #include "program.h"
 
 #include <sys/stat.h>
@@ -161,6 +162,110 @@ static void scenes_at_their_ends(void **state)
     assert_null(strstr(output, "\"in\": [0, 0, 0]"));
 }
 
+// A fit's files change together or not at all: here the table fits on the disk and the page does not.
+static void results_that_do_not_fit(void **state)
+{
+    (void)state;
+    char table[4096] = "r_mm,value_per_mm2,sd_per_mm2\n";
+    for (int i = 1; i < 40; i++)
+        snprintf(table + strlen(table), sizeof table - strlen(table), "%g,%.9g,%.9g\n", 0.5 * i, 0.03 * exp(-0.5 * i),
+                 3e-4 * exp(-0.5 * i));
+    save_text("hostile/other.csv", table);
+    assert_int_equal(run("fit --table hostile/profile.csv --side reflection -o hostile/whole --json") % ALB_UNDECIDED,
+                     0);
+    assert_int_equal(shell("cp -r hostile/whole hostile/before"), 0);
+    const int status = shell("(trap '' XFSZ; ulimit -f 16; exec timeout 60 '%s' fit --table hostile/other.csv --side "
+                             "reflection -o hostile/whole 2>/dev/null >/dev/null)",
+                             ALB_PROGRAM);
+    assert_int_equal(WEXITSTATUS(status), ALB_ACCESS);
+    assert_int_equal(shell("diff -r hostile/before hostile/whole"), 0);
+    assert_int_equal(run("fit --table hostile/other.csv --side reflection -o hostile/whole"), 0);
+    assert_int_not_equal(shell("diff -rq hostile/before hostile/whole >/dev/null"), 0);
+    assert_int_equal(shell("find hostile/whole | grep -q tmp"), 256);
+}
+
+// What stands in a comment of another program's file stays there, whatever a file is called.
+static void exports_of_odd_names(void **state)
+{
+    (void)state;
+    assert_int_equal(run("fit --table hostile/other.csv --side reflection -o hostile/odd"), 0);
+    assert_int_equal(shell("cp hostile/odd/material.json \"$(printf 'hostile/a\\nimport os\\n--b.json')\""), 0);
+    const char *const formats[] = {"cycles", "mitsuba"};
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(
+            shell("'%s' export \"$(printf 'hostile/a\\nimport os\\n--b.json')\" --to %s -o hostile/odd.txt "
+                  ">/dev/null",
+                  ALB_PROGRAM, formats[i]),
+            0);
+        char *text = slurp("hostile/odd.txt");
+        assert_non_null(strstr(text, "a_import os_-_b.json"));
+        free(text);
+    }
+    char *before = slurp("hostile/odd/material.json");
+    check_run("export hostile/odd/material.json --to csv -o hostile/odd/../odd/material.json", ALB_USAGE,
+              "the material itself");
+    char *after = slurp("hostile/odd/material.json");
+    assert_string_equal(before, after);
+    free(before);
+    free(after);
+}
+
+static void materials_that_lie(void **state)
+{
+    (void)state;
+    static const char part[] = "{\"format\":1,\"name\":\"wax\",\"channels\":{\"%s\":{%s}}}",
+                      side[] =
+                          "\"reflection\":{\"form\":\"exponential\",\"identifiable\":true,\"parameters\":{"
+                          "\"amplitude_1_per_mm2\":{\"value\":0.1,\"sd\":1},\"decay_1_per_mm\":{\"value\":1,\"sd\":1}},"
+                          "\"covariance\":[%s],\"total\":{\"value\":0.62831853071795862,\"sd\":1},\"chi_square\":1,"
+                          "\"degrees_of_freedom\":1}";
+    static const struct {
+        const char *channel, *covariance, *said;
+    } cases[] = {{"Y", "[-1,0],[0,1]", "do not make a covariance"},
+                 {"Y", "[1,2],[2,1]", "do not make a covariance"},
+                 {"Y", "[1,0.5],[-0.5,1]", "do not make a covariance"},
+                 {"a\\nb", "[1,0],[0,1]", "a channel's name"},
+                 {"--", "[1,0],[0,1]", "a channel's name"},
+                 {"Y", "", "no profile"}};
+    for (int i = 0; i < 6; i++) {
+        char content[1024] = "", text[2048];
+        if (*cases[i].covariance)
+            snprintf(content, sizeof content, side, cases[i].covariance);
+        snprintf(text, sizeof text, part, cases[i].channel, content);
+        save_text("hostile/lie.json", text);
+        check_run("export hostile/lie.json --to csv -o hostile/x.csv", ALB_BAD_DATA, cases[i].said);
+    }
+}
+
+// A picture of 64 x 64: a spot, or a line, and beside it the variance that it is said to have.
+static void save_lit(const char *path, bool line, float variance)
+{
+    alb_error error = {0};
+    alb_image image = {0};
+    check_ok(alb_image_create(&image, 64, 64, "Y,variance.Y", &error), &error);
+    for (int y = 0; y < 64; y++)
+        for (int x = 0; x < 64; x++) {
+            float *pixel = alb_image_at(&image, x, y);
+            pixel[0] = (float)exp(-0.5 * (line ? abs(x - 32) : hypot(x - 32, y - 32)));
+            pixel[1] = variance;
+        }
+    check_ok(alb_exr_write(&image, NULL, path, &error), &error);
+    alb_image_free(&image);
+}
+
+static void pictures_that_lie(void **state)
+{
+    (void)state;
+    static const float variances[] = {-1, NAN, INFINITY};
+    for (int i = 0; i < 3; i++) {
+        save_lit("hostile/lie.exr", false, variances[i]);
+        check_run("fit --image hostile/lie.exr --mm-per-pixel 0.5 -o hostile/f", ALB_BAD_DATA, "no pixel holds");
+    }
+    save_lit("hostile/line.exr", true, 1e-8F);
+    assert_int_equal(run("fit --image hostile/line.exr --mm-per-pixel 0.5 -o hostile/f"), ALB_UNDECIDED);
+    assert_non_null(strstr(complaint, "the data do not decide"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -168,6 +273,8 @@ int main(void)
         cmocka_unit_test(long_paths_keep_the_reason), cmocka_unit_test(closed_streams),
         cmocka_unit_test(files_that_cannot_grow),     cmocka_unit_test(names_that_are_not_text),
         cmocka_unit_test(tables_at_their_ends),       cmocka_unit_test(scenes_at_their_ends),
+        cmocka_unit_test(results_that_do_not_fit),    cmocka_unit_test(exports_of_odd_names),
+        cmocka_unit_test(materials_that_lie),         cmocka_unit_test(pictures_that_lie),
     };
     return cmocka_run_group_tests(tests, make_inputs, remove_inputs);
 }
