@@ -20,7 +20,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { TERMS = ALB_TERMS_MAX, STARTS = 8, ROOM = 16 };
+enum { TERMS = ALB_TERMS_MAX, STARTS = 8 };
 
 // A second term that gains less has rivals among what the noise makes.
 static const double gain_without_rival = 60;
@@ -30,8 +30,8 @@ typedef struct start {
 } start;
 
 typedef struct starts {
-    int count; // STARTS at most where the best are kept
-    start list[ROOM];
+    int count;
+    start list[STARTS];
 } starts;
 
 typedef struct search {
@@ -77,7 +77,7 @@ static void polish(alb_place *best, search *s, const double *x, int terms, alb_s
 // the least chi^2 of the merged readings.
 static double descend(alb_place *best, search *s, const starts *from, int terms, alb_signs signs)
 {
-    alb_place places[ROOM];
+    alb_place places[STARTS];
     double least = (double)INFINITY;
     int count = 0;
     for (int k = 0; k < from->count; k++) {
@@ -165,27 +165,44 @@ static void cut(starts *out, const alb_measure *m, const search *s, int terms)
         }
 }
 
-// From the single exponential and a second term on rungs finer than the grid, and one that the nearest readings alone
-// see: where a second term gains next to nothing, the minima of chi^2 lie less than two steps of the grid apart.
+// From the single exponential and a second term at each peak of what that gains on rungs finer than the grid. The
+// residual r of the single exponential, column c_1, is orthogonal to it and to f_1; a term at x lowers chi^2 where
+// r.c > 0, by (r.c)^2 / |c beside c_1 and f_1|^2 where that is little.
 static void climb(alb_place *best, search *s, const alb_place *one)
 {
-    static const double rungs[] = {-3, -2.2, -1.6, -1.1, -0.7, -0.35, 0.35, 0.7, 1.1, 1.6, 2.2, 3};
-    alb_term *first = &s->merged.term[0], *second = &s->merged.term[1];
-    const double pivot = one->x[0], fastest = s->x[s->columns - 1];
+    const alb_whitened *data = &s->all.data;
+    const int rows = data->basis->rows;
+    const double rung = 0.15, pivot = one->x[0], amplitude = one->amplitude[0];
+    alb_term *first = &s->all.term[0], *second = &s->all.term[1];
+    double products[TERMS][3], before = 0, at = 0;
+    start here = {0};
+    alb_term_evaluate(first, data, pivot, s->all.work);
+    alb_term_residual(s->all.residual, products, data, first, &amplitude, 1);
+    const double overlap = first->cf / first->cc, beside = first->ff - overlap * first->cf;
+    const int last = (int)((data->basis->highest - s->x[0]) / rung);
     starts from = {0};
-    alb_term_evaluate(first, &s->merged.data, pivot, s->merged.work);
-    for (size_t k = 0; k < sizeof rungs / sizeof rungs[0]; k++) {
-        const double x = pivot + rungs[k];
-        if (!(x > s->x[0] && x < fastest))
-            continue;
-        alb_term_evaluate(second, &s->merged.data, x, s->merged.work);
-        const double c = alb_columns_dot(first->column, second->column, s->merged.data.basis->rows);
-        const double a = second->cc * first->cv - c * second->cv, b = first->cc * second->cv - c * first->cv;
-        const double shift = a > 0 && b > 0 ? fmin(fmax(b / a * (pivot - x), -0.5), 0.5) : 0;
-        from.list[from.count++] = (start){0, {fmin(pivot + shift, x), fmax(pivot + shift, x)}};
+    for (int k = 0; k <= last + 1; k++) {
+        const double x = s->x[0] + k * rung;
+        double after = 0;
+        start next = {0};
+        if (k <= last) {
+            alb_term_evaluate(second, data, x, s->all.work);
+            const double lift = alb_columns_dot(s->all.residual, second->column, rows);
+            const double c = alb_columns_dot(first->column, second->column, rows);
+            const double f = alb_columns_dot(first->first, second->column, rows) - overlap * c;
+            const double length = second->cc - c * c / first->cc - f * f / beside;
+            after = lift > 0 && length > 1e-9 * second->cc ? lift * lift / length : 0;
+            const double shift = after > 0 ? fmin(fmax(-lift / length * f / beside / amplitude, -0.5), 0.5) : 0;
+            next = (start){after, {fmin(pivot + shift, x), fmax(pivot + shift, x)}};
+        }
+        if (at > before && at >= after)
+            keep(&from, here);
+        before = at;
+        at = after;
+        here = next;
     }
-    descend(best, s, &from, 2, ALB_POSITIVE);
-    polish(best, s, (const double[TERMS]){pivot, fastest}, 2, ALB_POSITIVE);
+    for (int k = 0; k < from.count; k++)
+        polish(best, s, from.list[k].x, 2, ALB_POSITIVE);
 }
 
 // From the single exponential and a second term at each peak of what that gains, the first moved so that the mean
