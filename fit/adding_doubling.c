@@ -234,33 +234,68 @@ void alb_layer_create(alb_layer *layer, const alb_streams *streams, double absor
     double_up(layer, doublings);
 }
 
-// Flux that leaves both faces together (odd: far less lit) when the beam brings 1 through the lit face and the faces
-// reflect. With gamma the reflectances, g^2 = gamma, s = T + R and sign +1 or T - R and -1, f and e what a face lets
-// out and the beam:   f^T s (1 - +-gamma s)^-1 e  =  f^T s e +- (g s f)^T (1 -+ g s g)^-1 (g s e).
+// What faces make of a layer. With gamma the reflectances, g^2 = gamma, s = T + R and sign +1 where both faces are lit
+// alike, T - R and -1 where they are lit oppositely (half the sum of both is the face beyond, half the difference the
+// near one), a beam e makes   v = s (1 -+ gamma s)^-1 e = s e +- s g (1 -+ g s g)^-1 g s e   at either face.
+// a = 1 -+ g s g.
+static void between_faces(alb_stream_matrix s, alb_stream_matrix a, double g[ALB_STREAMS_MAX],
+                          const alb_streams *streams, const alb_layer *layer, bool odd)
+{
+    const int n = streams->count;
+    for (int i = 0; i < n; i++)
+        g[i] = sqrt(streams->reflectance[i]);
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            s[i][j] = odd ? layer->odd[i][j] : (i == j) - layer->lost[i][j];
+            a[i][j] = (i == j) - (odd ? -1 : 1) * g[i] * s[i][j] * g[j];
+        }
+}
+
+// Flux that leaves both faces together (odd: far less lit) when the beam brings 1 through the lit face: f^T v, f what a
+// face lets out.
 static double leaving(const alb_streams *streams, const alb_layer *layer, bool odd)
 {
-    alb_stream_matrix a, b, out;
+    alb_stream_matrix s, a, b, out;
     const int n = streams->count;
-    const double sign = odd ? -1 : 1;
     double direct = 0, root[MAX], g[MAX];
-    for (int i = 0; i < n; i++) {
+    between_faces(s, a, g, streams, layer, odd);
+    for (int i = 0; i < n; i++)
         root[i] = sqrt(streams->cosine[i] * streams->weight[i]);
-        g[i] = sqrt(streams->reflectance[i]);
-    }
     for (int i = 0; i < n; i++) {
-        double beam = 0, let_out = 0;
-        for (int j = 0; j < n; j++) {
-            const double s = odd ? layer->odd[i][j] : (i == j) - layer->lost[i][j];
-            let_out += s * (1 - streams->reflectance[j]) * root[j];
-            beam = s / root[j]; // the last stays
-            a[i][j] = (i == j) - sign * g[i] * s * g[j];
-        }
+        const double beam = s[i][n - 1] / root[n - 1];
+        double let_out = 0;
+        for (int j = 0; j < n; j++)
+            let_out += s[i][j] * (1 - streams->reflectance[j]) * root[j];
         direct += (1 - streams->reflectance[i]) * root[i] * beam;
         b[i][0] = g[i] * let_out;
         b[i][1] = g[i] * beam;
     }
     sandwich(out, a, b, n, 2);
-    return direct + sign * out[0][1];
+    return direct + (odd ? -1 : 1) * out[0][1];
+}
+
+void alb_streams_within(double radiance[2][ALB_STREAMS_MAX], const alb_streams *streams, const alb_layer *layer)
+{
+    alb_stream_matrix s, a, out;
+    const int n = streams->count, last = n - 1;
+    double v[2][MAX], g[MAX];
+    for (int odd = 0; odd < 2; odd++) {
+        between_faces(s, a, g, streams, layer, odd);
+        for (int i = 0; i < n; i++)
+            v[odd][i] = s[i][last];
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n; j++)
+                s[i][j] *= g[i];
+        sandwich(out, a, s, n, n);
+        for (int i = 0; i < n; i++)
+            v[odd][i] += (odd ? -1 : 1) * out[i][last];
+    }
+    const double beam = sqrt(streams->cosine[last] * streams->weight[last]);
+    for (int i = 0; i < n; i++) {
+        const double scale = 0.5 / (beam * sqrt(streams->cosine[i] * streams->weight[i]));
+        radiance[0][i] = scale * (v[0][i] - v[1][i]);
+        radiance[1][i] = scale * (v[0][i] + v[1][i]);
+    }
 }
 
 alb_totals alb_adding_doubling(const alb_streams *streams, double absorption, double reduced_scattering,

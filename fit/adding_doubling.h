@@ -33,6 +33,10 @@ void alb_layer_create(alb_layer *layer, const alb_streams *streams, double absor
 // Two of them, one upon the other.
 void alb_layer_double(alb_layer *layer);
 
+// Radiance that comes from within upon the lit face [0] and the other one [1] of a layer with its faces, in the
+// streams, for a beam that brings the flux 1 through the lit face. The last stream, the normal, holds the beam besides.
+void alb_streams_within(double radiance[2][ALB_STREAMS_MAX], const alb_streams *streams, const alb_layer *layer);
+
 // Shares of the incident flux, all directions together. Reflection is without what the outside of the lit face turns
 // back, ((n-1)/(n+1))^2; transmission is with the light that never scattered.
 typedef struct alb_totals {

@@ -48,6 +48,18 @@ bool alb_face_seen(alb_face *face, const alb_camera *camera, alb_error *error)
     return true;
 }
 
+double alb_face_cosine(const alb_face *face, double x_mm, double y_mm)
+{
+    const size_t count = (size_t)face->width * (size_t)face->height;
+    double nearest = INFINITY, cosine = 0;
+    for (size_t i = 0; i < count; i++) {
+        const double distance = hypot(face->x_mm[i] - x_mm, face->y_mm[i] - y_mm);
+        if (distance < nearest)
+            nearest = distance, cosine = face->cosine[i];
+    }
+    return cosine;
+}
+
 void alb_face_free(alb_face *face)
 {
     free(face->x_mm);

@@ -17,7 +17,7 @@ double alb_fresnel_inside(double n, double mu)
     return 0.5 * (s * s + p * p);
 }
 
-alb_fresnel_moments alb_fresnel_moments_at(double n)
+static alb_fresnel_moments integrate(double n)
 {
     enum { STEPS = 512 };
     const double critical = sqrt(1 - 1 / (n * n)), h = 1.0 / STEPS;
@@ -32,4 +32,24 @@ alb_fresnel_moments alb_fresnel_moments_at(double n)
     alb_fresnel_moments out = {critical * critical + 2 * first, critical * critical * critical + 3 * second, 0};
     out.boundary = (1 + out.second) / (1 - out.first);
     return out;
+}
+
+// Forms of free index ask for the same three indices (a central difference) at every distance: each thread keeps the
+// last few.
+alb_fresnel_moments alb_fresnel_moments_at(double n)
+{
+    enum { KEPT = 4 };
+    static _Thread_local struct {
+        double index;
+        alb_fresnel_moments moments;
+    } kept[KEPT];
+    static _Thread_local int oldest;
+    for (int i = 0; i < KEPT; i++)
+        if (kept[i].index == n)
+            return kept[i].moments;
+    const alb_fresnel_moments moments = integrate(n);
+    kept[oldest].index = n;
+    kept[oldest].moments = moments;
+    oldest = (oldest + 1) % KEPT;
+    return moments;
 }

@@ -33,9 +33,10 @@ static void find_images(alb_fitting *fitting)
         for (int side = 0; side < ALB_SIDES; side++)
             if (fitting->sides[side][c].measured)
                 sides[side] = (alb_joint_side){&fitting->sides[side][c].readings, &fitting->sides[side][c].forward};
-        const alb_joint_known known = {fitting->material.thickness_mm,   fitting->material.refractive_index,
-                                       fitting->basis.anisotropy,        anisotropy_sd,
-                                       fitting->sides[0][c].common.flux, M_SQRT2 * fitting->basis.own_sd};
+        const alb_joint_known known = {
+            fitting->material.thickness_mm,   fitting->material.refractive_index,
+            fitting->basis.anisotropy,        anisotropy_sd,
+            fitting->sides[0][c].common.flux, hypot(fitting->basis.own_sd[0][c], fitting->basis.own_sd[1][c])};
         if (sides[ALB_REFLECTION].readings && sides[ALB_TRANSMISSION].readings)
             alb_image_properties_find(&fitting->properties[c].images, sides, &known);
     }

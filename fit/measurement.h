@@ -7,6 +7,7 @@
 typedef struct alb_measurement {
     bool measured;
     alb_readings readings;
+    double exit_cosine; // to the normal, of the line of sight to their centre; 0: they are taken as exitance
     alb_operator forward;
     alb_common_sd common;
     alb_outcome outcome;

@@ -15,6 +15,8 @@ typedef struct alb_face {
 bool alb_face_flat(alb_face *face, int width, int height, double mm_per_pixel, alb_error *error);
 // The plane z = 0 of the camera's world.
 bool alb_face_seen(alb_face *face, const alb_camera *camera, alb_error *error);
+// Of the pixel nearest to a place.
+double alb_face_cosine(const alb_face *face, double x_mm, double y_mm);
 void alb_face_free(alb_face *face);
 
 // One channel of an image on a face: width * height values, NaN where nothing was measured, and their variances (NULL

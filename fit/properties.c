@@ -30,7 +30,7 @@ static alb_measured_totals totals_of(const alb_material *material, const alb_pro
     alb_measured_totals out = {.thickness_mm = slab ? material->thickness_mm : 0};
     for (int side = 0; side < (slab ? 2 : 1); side++) {
         const alb_fitted *fitted = &material->fitted[side][c];
-        const double common = basis->common_sd[side][c], own = fmin(common, basis->own_sd);
+        const double common = basis->common_sd[side][c], own = fmin(common, basis->own_sd[side][c]);
         const double shared = common * common - own * own, all = fitted->total_sd / fitted->total;
         const double sd = fitted->total * sqrt(fmax(0, all * all - shared));
         out.scale_sd = fmax(out.scale_sd, sqrt(shared));
@@ -40,9 +40,12 @@ static alb_measured_totals totals_of(const alb_material *material, const alb_pro
     return out;
 }
 
+double alb_other_anisotropy(double assumed) { return assumed < 0.5 ? 0.9 : 0; }
+
 void alb_properties_find(alb_properties properties[3], const alb_material *material, const alb_properties_basis *basis)
 {
-    const double n = material->refractive_index, assumed_g = basis->anisotropy, other_g = assumed_g < 0.5 ? 0.9 : 0;
+    const double n = material->refractive_index, assumed_g = basis->anisotropy,
+                 other_g = alb_other_anisotropy(assumed_g);
     for (int c = 0; c < 3; c++)
         properties[c] = (alb_properties){.anisotropy = assumed_g, .other_anisotropy = other_g, .other = {NAN, NAN}};
     if (!(n >= 1))

@@ -23,8 +23,11 @@ typedef struct alb_properties_basis {
     alb_finish finish;              // of the faces
     double anisotropy;              // g, assumed
     double common_sd[ALB_SIDES][3]; // relative, common to all readings of a side and channel
-    double own_sd;                  // the part of it that the other side does not share
+    double own_sd[ALB_SIDES][3];    // the part of it that the other side does not share
 } alb_properties_basis;
+
+// Another one than the assumed g, to say what not knowing it costs.
+double alb_other_anisotropy(double assumed);
 
 // Of a slab: both sides fitted, thickness and index known; where reflection alone was fitted, of a half-space of the
 // index.

@@ -1,7 +1,8 @@
 // From files to fitted sides.
 //
 // A session's products hold radiance per flux, L / Phi; every pixel is turned into exitance by the direction that it
-// sees the face from (exit_angle.c), which is 1 % uncertain for a smooth face and common to a side's readings. The
+// sees the face from (exit_angle.c), which is 1 % uncertain for a smooth face and common to a side's readings, and less
+// where both sides say what the slab is made of (exit_correct.c). The
 // image of the spot on the white reference serves both sides: it is the light that enters the front. Images given by
 // hand keep their unit; what saturates (integers at full scale) and what is not finite, or has no variance of zero or
 // more beside it where there is a channel of them, counts as not measured.
@@ -10,6 +11,7 @@
 #include "base/memory.h"
 #include "calibrate/calibration.h"
 #include "fit/exit_angle.h"
+#include "fit/exit_correct.h"
 #include "fit/photo.h"
 #include "fit/product.h"
 #include "fit/table.h"
@@ -192,6 +194,10 @@ static bool observe_product(alb_fitting *fitting, white_spot *white, alb_provena
                                       calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0),
                                 calibration->views[product->side].relative_length_sd};
         ok = alb_photo_observe(fitting, &seen, notes, error);
+        for (int c = 0; ok && c < calibration->channels; c++) {
+            alb_measurement *one = &fitting->sides[product->side][c];
+            one->exit_cosine = alb_face_cosine(&face, one->readings.x_mm, one->readings.y_mm);
+        }
         if (ok && product->side == ALB_REFLECTION)
             note_drift(notes, fitting, spots);
     }
@@ -239,14 +245,17 @@ bool alb_fitting_from_session(alb_fitting *fitting, alb_map *map, alb_provenance
         material->finish_known = true;
         material->finish = calibration->finish;
         fitting->basis.finish = calibration->finish;
-        fitting->basis.own_sd = calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0;
+        for (int i = 0; i < ALB_SIDES * 3; i++)
+            fitting->basis.own_sd[i / 3][i % 3] = calibration->finish == ALB_FINISH_SMOOTH ? ALB_EXIT_RELATIVE_SD : 0;
         material->channels = calibration->channels;
         memcpy(material->channel_names, calibration->channel_names, sizeof material->channel_names);
         if (alb_map_is_wanted(calibration))
             ok = alb_map_from_session(map, fitting, provenance, notes, calibration, error);
-        else if ((ok = observe_products(fitting, provenance, notes, calibration, error) &&
-                       alb_fitting_run(fitting, error)))
-            alb_photo_note_border(notes, fitting);
+        else if ((ok = observe_products(fitting, provenance, notes, calibration, error))) {
+            alb_exit_correct(fitting, notes);
+            if ((ok = alb_fitting_run(fitting, error)))
+                alb_photo_note_border(notes, fitting);
+        }
     }
     free(calibration);
     return ok;

@@ -139,8 +139,13 @@ static inline void ord_forced(double *p, double *m, ordinates *o, double t, doub
         p[i] = o->system[i][2 * ORD_N], m[i] = o->system[ORD_N + i][2 * ORD_N];
 }
 
-// out[0] reflection, out[1] transmission, as photon.h's `leaving`.
-static inline void discrete_ordinates(double out[2], const alb_medium *medium)
+// pi L / M of the scattered light, and cosines to the normal in air, rising.
+typedef struct ord_lobe {
+    double cosine[ORD_ABOVE], ratio[2][ORD_ABOVE];
+} ord_lobe;
+
+// out[0] reflection, out[1] transmission, as photon.h's `leaving`. lobe may be NULL.
+static inline void discrete_ordinates_lobe(double out[2], ord_lobe *lobe, const alb_medium *medium)
 {
     ordinates *o = calloc(1, sizeof *o);
     const double n = medium->refractive_index, c = sqrt(1 - 1 / (n * n)), d = medium->thickness_mm;
@@ -177,7 +182,8 @@ static inline void discrete_ordinates(double out[2], const alb_medium *medium)
     ord_solve(o, 2 * ORD_N);
     for (int face = 0; face < 2; face++) {
         const double side = face ? -1 : 1, from_down = down * (face ? e : 1), from_up = up * (face ? 1 : e);
-        out[face] = (1 - r) * (face ? down * e : up * e);
+        const double beam = (1 - r) * (face ? down * e : up * e);
+        out[face] = beam;
         for (int i = 0; i < ORD_N; i++) {
             double leaving = from_down * (force[0][0][i] - side * force[0][1][i]) +
                              from_up * (force[1][0][i] - side * force[1][1][i]);
@@ -188,7 +194,19 @@ static inline void discrete_ordinates(double out[2], const alb_medium *medium)
                     a * (o->p_mode[i][j] - side * o->m_mode[i][j]) + b * (o->p_mode[i][j] + side * o->m_mode[i][j]);
             }
             out[face] += leaving / 2 * (1 - o->face[i]) * sqrt(o->mu[i] * o->w[i]);
+            if (lobe && i >= ORD_BELOW) {
+                lobe->cosine[i - ORD_BELOW] = sqrt(1 - n * n * (1 - o->mu[i] * o->mu[i]));
+                lobe->ratio[face][i - ORD_BELOW] =
+                    leaving / 2 / sqrt(o->mu[i] * o->w[i]) * (1 - o->face[i]) / (2 * n * n);
+            }
         }
+        for (int i = 0; lobe && i < ORD_ABOVE; i++)
+            lobe->ratio[face][i] /= out[face] - beam;
     }
     free(o);
+}
+
+static inline void discrete_ordinates(double out[2], const alb_medium *medium)
+{
+    discrete_ordinates_lobe(out, NULL, medium);
 }

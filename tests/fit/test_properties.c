@@ -52,7 +52,7 @@ static void shared_and_own_errors(void **state)
     (void)state;
     const alb_material material = marble(0.01);
     alb_properties_basis shared = {.common_sd = {{0.01}, {0.01}}}, own = shared;
-    own.own_sd = 0.01;
+    own.own_sd[0][0] = own.own_sd[1][0] = 0.01;
     alb_properties p[2][3];
     alb_properties_find(p[0], &material, &shared);
     alb_properties_find(p[1], &material, &own);
