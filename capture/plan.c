@@ -171,8 +171,8 @@ bool alb_plan_parse(alb_plan *plan, alb_node object, alb_error *error)
            name(plan->sample, sample, "name", error) &&
            alb_node_number(&plan->thickness_mm, sample, "thickness_mm", 0.01, 1000, error) &&
            alb_node_number(&plan->refractive_index, sample, "refractive_index", 1, 4, error) &&
-           alb_finish_read(&plan->finish, sample, error) &&
-           alb_node_object(&white, object, "white_reference", error) && alb_node_allow(white, "reflectance", error) &&
+           alb_finish_read(&plan->finish, sample, error) && alb_node_object(&white, object, "white_reference", error) &&
+           alb_node_allow(white, "reflectance", error) &&
            alb_node_numbers(plan->white_reflectance, 3, white, "reflectance", 0.01, 1, error) &&
            alb_node_object(&board, object, "board", error) && alb_node_allow(board, "columns rows square_mm", error) &&
            count(&plan->board_columns, board, "columns", 3, 60, error) &&

@@ -6,7 +6,8 @@
 #include <unistd.h>
 
 static const char *const plan_json =
-    "{\"format\": 1, \"sample\": {\"name\": \"wax\", \"thickness_mm\": 6, \"refractive_index\": 1.45, \"finish\": \"ground\"},\n"
+    "{\"format\": 1, \"sample\": {\"name\": \"wax\", \"thickness_mm\": 6, \"refractive_index\": 1.45, \"finish\": "
+    "\"ground\"},\n"
     " \"white_reference\": {\"reflectance\": [0.99, 0.98, 0.97]}, \"board\": {\"columns\": 9, \"rows\": 6, "
     "\"square_mm\": 3},\n"
     " \"shots\": [{\"name\": \"dark\", \"target\": \"cap\", \"pattern\": {\"kind\": \"black\"}, \"exposures_s\": "

@@ -16,14 +16,9 @@ static int in_own_folder(void **state)
 
 static int leave(void **state)
 {
-    static const char *const files[] = {"folder/profile.csv",
-                                        "folder/material.json",
-                                        "folder/report/fit.csv",
-                                        "folder/report/fit.svg",
-                                        "folder/report/fit.html",
-                                        "folder/report/fit.json",
-                                        "folder/report",
-                                        "folder"};
+    static const char *const files[] = {
+        "folder/profile.csv",     "folder/material.json",   "folder/report/fit.csv", "folder/report/fit.svg",
+        "folder/report/fit.html", "folder/report/fit.json", "folder/report",         "folder"};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++)
         remove(files[i]);
     return chdir("/") != 0 || rmdir(*state) != 0;
