@@ -8,43 +8,10 @@
 // not cut by the border.
 #include "fit/anisotropy.h"
 #include "base/statistics.h"
+#include "fit/cholesky.h"
 #include <math.h>
 
 enum { PARTS = 5, FEWEST = 16 };
-
-// Cholesky, in place: lower triangle. False where the matrix is not clearly positive.
-static bool factor(double a[PARTS][PARTS])
-{
-    for (int j = 0; j < PARTS; j++) {
-        double d = a[j][j];
-        for (int k = 0; k < j; k++)
-            d -= a[j][k] * a[j][k];
-        if (!(d > 1e-6 * a[j][j]))
-            return false;
-        a[j][j] = sqrt(d);
-        for (int i = j + 1; i < PARTS; i++) {
-            double sum = a[i][j];
-            for (int k = 0; k < j; k++)
-                sum -= a[i][k] * a[j][k];
-            a[i][j] = sum / a[j][j];
-        }
-    }
-    return true;
-}
-
-static void solve(double x[PARTS], double l[PARTS][PARTS])
-{
-    for (int i = 0; i < PARTS; i++) {
-        for (int k = 0; k < i; k++)
-            x[i] -= l[i][k] * x[k];
-        x[i] /= l[i][i];
-    }
-    for (int i = PARTS - 1; i >= 0; i--) {
-        for (int k = i + 1; k < PARTS; k++)
-            x[i] -= l[k][i] * x[k];
-        x[i] /= l[i][i];
-    }
-}
 
 void alb_ring_harmonics(double harmonics[4], double *variance, const alb_ring_pixel *pixels, size_t count,
                         const alb_trend *trend)
@@ -63,9 +30,9 @@ void alb_ring_harmonics(double harmonics[4], double *variance, const alb_ring_pi
     *variance = NAN;
     for (int j = 0; j < 4; j++)
         harmonics[j] = NAN;
-    if (count < FEWEST || !factor(a))
+    if (count < FEWEST || !alb_cholesky_factor(a[0], PARTS, PARTS, 1e-6))
         return;
-    solve(b, a);
+    alb_cholesky_solve(b, a[0], PARTS, PARTS);
     for (int j = 0; j < 4; j++)
         harmonics[j] = b[j + 1];
     *variance = 2 / (double)count;

@@ -15,6 +15,7 @@
 // with smooth faces in air; the spot is small against the slab.
 #include "fit/joint.h"
 #include "base/memory.h"
+#include "fit/cholesky.h"
 #include "fit/diffusion.h"
 #include "fit/solve.h"
 #include <math.h>
@@ -207,30 +208,18 @@ static bool invert(double inverse[PARAMETERS][PARAMETERS], double a[PARAMETERS][
         if (!(scale[i] > 0 && isfinite(scale[i])))
             return false;
     }
-    double l[PARAMETERS][PARAMETERS] = {{0}}; // Cholesky of the matrix with unit diagonal
+    double l[PARAMETERS][PARAMETERS];
     for (int i = 0; i < PARAMETERS; i++)
-        for (int j = 0; j <= i; j++) {
-            double sum = a[i][j] / (scale[i] * scale[j]);
-            for (int k = 0; k < j; k++)
-                sum -= l[i][k] * l[j][k];
-            if (i == j && !(sum > 1e-12))
-                return false;
-            l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
-        }
+        for (int j = 0; j <= i; j++)
+            l[i][j] = a[i][j] / (scale[i] * scale[j]);
+    if (!alb_cholesky_factor(l[0], PARAMETERS, PARAMETERS, 1e-12))
+        return false;
     for (int c = 0; c < PARAMETERS; c++) {
-        double x[PARAMETERS];
-        for (int i = 0; i < PARAMETERS; i++) {
-            x[i] = i == c;
-            for (int k = 0; k < i; k++)
-                x[i] -= l[i][k] * x[k];
-            x[i] /= l[i][i];
-        }
-        for (int i = PARAMETERS - 1; i >= 0; i--) {
-            for (int k = i + 1; k < PARAMETERS; k++)
-                x[i] -= l[k][i] * x[k];
-            x[i] /= l[i][i];
+        double x[PARAMETERS] = {0};
+        x[c] = 1;
+        alb_cholesky_solve(x, l[0], PARAMETERS, PARAMETERS);
+        for (int i = 0; i < PARAMETERS; i++)
             inverse[i][c] = x[i] / (scale[i] * scale[c]);
-        }
     }
     return true;
 }

@@ -1,6 +1,7 @@
 // Active sets (Lawson & Hanson 1974, Solving Least Squares Problems, ch. 23) on normal equations of columns of unit
 // length. Convex: there is one minimum. Stops being true where columns are linear in each other but for 1e-13.
 #include "fit/measure.h"
+#include "fit/cholesky.h"
 #include "fit/columns.h"
 #include <math.h>
 #include <stdbool.h>
@@ -13,23 +14,12 @@ static bool solve(double *amplitude, const alb_measure *m, const double *gram, c
     double l[ATOMS][ATOMS];
     for (int i = 0; i < m->count; i++) {
         amplitude[i] = right[m->column[i]];
-        for (int j = 0; j <= i; j++) {
-            double sum = gram[m->column[i] * columns + m->column[j]];
-            for (int k = 0; k < j; k++)
-                sum -= l[i][k] * l[j][k];
-            if (i == j && !(sum > 1e-13))
-                return false;
-            l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
-        }
-        for (int k = 0; k < i; k++)
-            amplitude[i] -= l[i][k] * amplitude[k];
-        amplitude[i] /= l[i][i];
+        for (int j = 0; j <= i; j++)
+            l[i][j] = gram[m->column[i] * columns + m->column[j]];
     }
-    for (int i = m->count - 1; i >= 0; i--) {
-        for (int k = i + 1; k < m->count; k++)
-            amplitude[i] -= l[k][i] * amplitude[k];
-        amplitude[i] /= l[i][i];
-    }
+    if (!alb_cholesky_factor(l[0], m->count, ATOMS, 1e-13))
+        return false;
+    alb_cholesky_solve(amplitude, l[0], m->count, ATOMS);
     return true;
 }
 

@@ -16,6 +16,7 @@
 // degree of freedom: the interval is too wide), and where D has a second valley as deep: only the first is followed.
 #include "fit/profile_likelihood.h"
 #include "base/memory.h"
+#include "fit/cholesky.h"
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
@@ -172,26 +173,14 @@ static bool solve(double *x, const double *a, const double *b, int n, double dam
         if (!(scale[i] > 0) || !isfinite(scale[i]))
             return false;
     }
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j <= i; j++) {
-            double sum = i == j ? 1 + damping : a[i * FREE + j] / (scale[i] * scale[j]);
-            for (int k = 0; k < j; k++)
-                sum -= l[i * FREE + k] * l[j * FREE + k];
-            if (i == j && !(sum > 1e-15))
-                return false;
-            l[i * FREE + j] = i == j ? sqrt(sum) : sum / l[j * FREE + j];
-        }
     for (int i = 0; i < n; i++) {
         x[i] = b[i] / scale[i];
-        for (int k = 0; k < i; k++)
-            x[i] -= l[i * FREE + k] * x[k];
-        x[i] /= l[i * FREE + i];
+        for (int j = 0; j <= i; j++)
+            l[i * FREE + j] = i == j ? 1 + damping : a[i * FREE + j] / (scale[i] * scale[j]);
     }
-    for (int i = n - 1; i >= 0; i--) {
-        for (int k = i + 1; k < n; k++)
-            x[i] -= l[k * FREE + i] * x[k];
-        x[i] /= l[i * FREE + i];
-    }
+    if (!alb_cholesky_factor(l, n, FREE, 1e-15 / (1 + damping)))
+        return false;
+    alb_cholesky_solve(x, l, n, FREE);
     for (int i = 0; i < n; i++)
         x[i] /= scale[i];
     return true;

@@ -11,42 +11,13 @@
 // a (c_1 - c_2). The tied pair stays on the bound. Residuals come from the data and amplitudes are refined by them, so
 // that squaring the condition costs steps, not digits. Stops being true where 1 - cos^2 of two columns is below 1e-14.
 #include "fit/reduced.h"
+#include "fit/cholesky.h"
 #include "fit/search.h"
 #include <math.h>
 #include <string.h>
 
 enum { TERMS = ALB_TERMS_MAX };
 typedef alb_small_matrix matrix;
-
-// Cholesky, in place below the diagonal; false where a pivot is not above `least` of the diagonal.
-static bool factor(matrix m, int n, double least)
-{
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j <= i; j++) {
-            const double diagonal = m[i][i];
-            double sum = m[i][j];
-            for (int k = 0; k < j; k++)
-                sum -= m[i][k] * m[j][k];
-            if (i == j && !(sum > least * diagonal))
-                return false;
-            m[i][j] = i == j ? sqrt(sum) : sum / m[j][j];
-        }
-    return true;
-}
-
-static void solve(double *x, matrix l, int n)
-{
-    for (int i = 0; i < n; i++) {
-        for (int k = 0; k < i; k++)
-            x[i] -= l[i][k] * x[k];
-        x[i] /= l[i][i];
-    }
-    for (int i = n - 1; i >= 0; i--) {
-        for (int k = i + 1; k < n; k++)
-            x[i] -= l[k][i] * x[k];
-        x[i] /= l[i][i];
-    }
-}
 
 // The linear problem at one place: free amplitudes, and the factor of their matrix. One where the pair is pinned to
 // a (c_1 - c_2).
@@ -62,9 +33,9 @@ static bool solve_amplitudes(alb_place *p, linear *system, const alb_reduced *q,
     memcpy(system->factor, p->cc, sizeof p->cc);
     for (int t = 0; t < terms; t++)
         p->amplitude[t] = q->term[t].cv;
-    if (!factor(system->factor, terms, 1e-14))
+    if (!alb_cholesky_factor(system->factor[0], terms, TERMS, 1e-14))
         return false;
-    solve(p->amplitude, system->factor, terms);
+    alb_cholesky_solve(p->amplitude, system->factor[0], terms, TERMS);
     if (signs != ALB_POSITIVE && p->amplitude[0] + p->amplitude[1] < 0) {
         *system = (linear){1, true, {{sqrt(p->cc[0][0] - 2 * p->cc[0][1] + p->cc[1][1])}}};
         p->amplitude[0] = (q->term[0].cv - q->term[1].cv) / (system->factor[0][0] * system->factor[0][0]);
@@ -92,7 +63,7 @@ static void refine(alb_place *p, double products[TERMS][3], const linear *system
         right[t] = change[t] = products[t][0];
     gather(change, system);
     gather(right, system);
-    solve(change, (double(*)[TERMS])system->factor, system->count);
+    alb_cholesky_solve(change, system->factor[0], system->count, TERMS);
     for (int k = 0; k < system->count; k++)
         p->chi_square -= change[k] * right[k];
     if (system->pinned)
@@ -170,9 +141,9 @@ static bool newton_step(double *step, matrix hessian, matrix scale, const double
         for (int j = 0; j < n; j++)
             m[i][j] = fixed[i] || fixed[j] ? i == j : hessian[i][j] + (i == j ? damping * scale[i][i] : 0);
     }
-    if (!factor(m, n, 1e-13))
+    if (!alb_cholesky_factor(m[0], n, TERMS, 1e-13))
         return false;
-    solve(step, m, n);
+    alb_cholesky_solve(step, m[0], n, TERMS);
     return true;
 }
 

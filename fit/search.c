@@ -8,6 +8,7 @@
 // the linear approximation: too small where the decays come close (b2/b1 below about 1.5 at 1 % noise).
 #include "fit/search.h"
 #include "base/memory.h"
+#include "fit/cholesky.h"
 #include "fit/gauss_newton.h"
 #include "fit/separable.h"
 #include "fit/solve.h"
@@ -169,22 +170,15 @@ bool alb_search(alb_profile *profile, double *chi_square, bool *found, alb_candi
 // 1 - R^2 of a parameter on those before it, is below 1e-11.
 static bool invert(double matrix[PARAMETERS][PARAMETERS], int n)
 {
-    double l[PARAMETERS][PARAMETERS] = {{0}}, inverse[PARAMETERS][PARAMETERS] = {{0}};
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j <= i; j++) {
-            double sum = matrix[i][j];
-            for (int k = 0; k < j; k++)
-                sum -= l[i][k] * l[j][k];
-            if (i == j && !(sum > 1e-11))
-                return false;
-            l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
-        }
+    double inverse[PARAMETERS][PARAMETERS] = {{0}}; // of the factor
+    if (!alb_cholesky_factor(matrix[0], n, PARAMETERS, 1e-11))
+        return false;
     for (int column = 0; column < n; column++)
         for (int i = column; i < n; i++) {
             double sum = i == column ? 1 : 0;
             for (int k = column; k < i; k++)
-                sum -= l[i][k] * inverse[k][column];
-            inverse[i][column] = sum / l[i][i];
+                sum -= matrix[i][k] * inverse[k][column];
+            inverse[i][column] = sum / matrix[i][i];
         }
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
