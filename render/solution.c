@@ -35,7 +35,7 @@ static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *er
 
 static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
-    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, error))
+    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, 0.005, error))
         return false;
     s->bytes[ALB_STAGE_SCATTERING] = alb_scatter_bytes(&s->scatter);
     const bool closed = !s->factors.sky_rays && !s->factors.back_rays;
@@ -69,8 +69,11 @@ static bool take_across(alb_solution *s, const alb_scene *scene, const double (*
     bool wanted = false;
     for (size_t i = 0; i < scene->surface_count; i++)
         wanted |= scene->surfaces[i].slab && scene->surfaces[i].exits[ALB_TRANSMISSION].smooth;
-    return !wanted || ((s->across = alb_allocate(s->patches.count, sizeof *s->across, error)) &&
-                       alb_scatter_apply_across(s->across, &s->scatter, irradiance, error));
+    if (wanted && !(s->across = alb_allocate(s->patches.count, sizeof *s->across, error)))
+        return false;
+    if (wanted)
+        alb_scatter_apply_across(s->across, &s->scatter, irradiance);
+    return true;
 }
 
 // What the whole irradiance H = E + F B says.
