@@ -43,6 +43,8 @@ alb_vector alb_form_factors_direction(const alb_form_factors *factors, const alb
 static uint32_t cast(const alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer,
                      size_t patch, int q)
 {
+    if (alb_patch_buried(patches, patch))
+        return (uint32_t)patches->count + 1;
     alb_random random = alb_random_at(factors->seed, 2 * patch + 1, (uint64_t)q);
     const double u = alb_random_uniform(&random), v = alb_random_uniform(&random);
     const alb_vector origin = alb_patch_point(patches, patch, u, v);
