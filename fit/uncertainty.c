@@ -199,6 +199,9 @@ bool alb_outcome_complete(alb_outcome *outcome, alb_candidate candidate, const a
     fitted->total_sd = sqrt(variance + fitted->total * fitted->total * common.flux * common.flux);
     for (int p = 0; p < n; p++)
         fitted->sd[p] = sqrt(fitted->covariance[p][p]);
+    for (int p = 0; !full_rank && p < n; p++)
+        fitted->sd[p] = NAN;
+    fitted->total_sd = full_rank ? fitted->total_sd : (double)NAN;
     fitted->degrees_of_freedom = readings->count - alb_candidate_parameters(candidate) - with_offset;
     if (!alb_outcome_describe_fit(outcome, readings, weighing->forward, error))
         return false;
