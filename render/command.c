@@ -37,7 +37,7 @@ static bool check_targets(const outputs *out, alb_error *error)
     const char *const paths[] = {out->scene, out->picture, png, out->mesh};
     for (int i = 1; i < 4 && paths[i]; i++) {
         for (int k = 0; k < i; k++)
-            if (!strcmp(paths[i], paths[k]))
+            if (alb_file_same(paths[i], paths[k]))
                 return alb_fail(error, ALB_USAGE, "%s is given for two files; give each its own", paths[i]);
         if (!alb_file_check_target(paths[i], error))
             return false;
