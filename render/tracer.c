@@ -67,7 +67,7 @@ static void find_bounds(alb_tracer *tracer, const alb_mesh *mesh)
     if (low.x > high.x)
         return;
     const alb_vector half = alb_times(0.5, alb_sub(high, low));
-    tracer->centre_mm = alb_add(low, half);
+    tracer->middle = alb_add(low, half);
     tracer->slack_mm = 64 * 0x1p-24 * fmax(half.x, fmax(half.y, half.z));
 }
 
@@ -106,7 +106,7 @@ bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *erro
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     tracer->scene = scene;
     find_bounds(tracer, mesh);
-    bool ok = scene && geometry && (!mesh->face_count || fill(geometry, mesh, tracer->centre_mm));
+    bool ok = scene && geometry && (!mesh->face_count || fill(geometry, mesh, tracer->middle));
     if (ok) {
         rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | FILTERED);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
@@ -137,7 +137,7 @@ void alb_tracer_free(alb_tracer *tracer)
 
 static struct RTCRay ray_of(const alb_tracer *tracer, alb_vector origin, alb_vector direction, float near, float far)
 {
-    const alb_vector from = alb_sub(origin, tracer->centre_mm);
+    const alb_vector from = alb_sub(origin, tracer->middle);
     return (struct RTCRay){.org_x = (float)from.x,
                            .org_y = (float)from.y,
                            .org_z = (float)from.z,

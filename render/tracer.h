@@ -5,7 +5,7 @@
 typedef struct alb_tracer {
     void *device, *scene; // Embree handles
     int64_t bytes;        // memory Embree holds; its own count
-    alb_vector centre_mm; // of the mesh's bounds: Embree's origin
+    alb_vector middle;    // of the mesh's bounds: Embree's origin
     double slack_mm;      // nearer than this along a ray two surfaces may come in either order
 } alb_tracer;
 
