@@ -112,7 +112,7 @@ static void warn(const alb_scene *scene, const alb_solution *s)
         fprintf(stderr,
                 "render: %.2f %% of the rays between patches meet the back of a patch, which is black; is a mesh open "
                 "or turned?\n",
-                100.0 * (double)s->factors.back_rays / ((double)s->patches.count * s->factors.rays));
+                100.0 * (double)s->factors.back_rays / (double)s->factors.rows.first[s->patches.count]);
     for (size_t b = 0; b < s->scatter.body_count; b++) {
         open += !s->scatter.bodies[b].closed;
         bent += s->scatter.bodies[b].closed && !s->scatter.bodies[b].convex;

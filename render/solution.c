@@ -44,23 +44,16 @@ static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *
 
 static void take_balance(alb_solution *s, const double (*irradiance)[3])
 {
-    const size_t n = s->patches.count, rays = (size_t)s->factors.rays;
     const double(*kept)[3] = (const double(*)[3])s->scatter.column_sums;
-    for (size_t p = 0; p < n; p++) {
-        size_t sky = 0, back = 0;
-        for (size_t q = 0; q < rays; q++) {
-            sky += s->factors.hits[p * rays + q] == n;
-            back += s->factors.hits[p * rays + q] == n + 1;
-        }
+    for (size_t p = 0; p < s->patches.count; p++)
         for (int c = 0; c < 3; c++) {
             const double area = s->patches.areas_mm2[p];
             s->column_sum = fmax(s->column_sum, kept[p][c]);
             s->balance.in[c] += area * (s->irradiance[p][c] + (s->lamps_direct ? 0 : s->exitance[p][c]));
             s->balance.absorbed[c] += area * (1 - kept[p][c]) * irradiance[p][c];
-            s->balance.escaped[c] += area * s->radiosity[p][c] * (double)sky / (double)rays;
-            s->balance.lost[c] += area * s->radiosity[p][c] * (double)back / (double)rays;
+            s->balance.escaped[c] += area * s->radiosity[p][c] * (double)s->factors.sky_shares[p];
+            s->balance.lost[c] += area * s->radiosity[p][c] * (double)s->factors.back_shares[p];
         }
-    }
 }
 
 // What leaves a smooth slab on the far side leaves in other directions than what is reflected.
@@ -118,9 +111,11 @@ static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, 
         s->bytes[stage] = (size_t)s->tracer.bytes;
         return true;
     case ALB_STAGE_FORM_FACTORS:
-        s->bytes[stage] = s->patches.count * (size_t)scene->rays_per_patch * sizeof(uint32_t);
-        return alb_form_factors_create(&s->factors, &s->patches, &s->tracer, scene->rays_per_patch, scene->seed,
-                                       ALB_SAMPLING_LATTICE, error);
+        if (!alb_form_factors_create(&s->factors, &s->patches, &s->tracer, scene->rays_per_patch, scene->seed,
+                                     ALB_SAMPLING_LATTICE, error))
+            return false;
+        s->bytes[stage] = alb_form_factors_bytes(&s->factors);
+        return true;
     case ALB_STAGE_LIGHTS:
         return light_patches(s, scene, error);
     case ALB_STAGE_SCATTERING:

@@ -9,7 +9,7 @@
 
 static void scene_of(alb_scene *scene, alb_mesh *mesh, const alb_surface *surfaces, size_t count, int rays)
 {
-    *scene = (alb_scene){.rays_per_patch = rays, .residual = 1e-9, .seed = 5, .surface_count = count};
+    *scene = (alb_scene){.rays_per_patch = rays, .residual = 1e-6, .seed = 5, .surface_count = count};
     scene->mesh = *mesh;
     *mesh = (alb_mesh){0};
     scene->surfaces = calloc(count, sizeof *surfaces);
@@ -28,12 +28,13 @@ static void closed_sphere_is_exact(void **state)
     const alb_surface wall = {.name = "wall", .reflectance = {0.1, 0.9, 0.99}, .exitance = {1, 2, 3}};
     check_ok(alb_shape_sphere(&mesh, &sphere, &error), &error);
     scene_of(&scene, &mesh, &wall, 1, 64);
+    scene.residual = 5e-5; // products round to 1e-7, which 1 / (1 - reflectance) multiplies
     check_ok(alb_solution_create(&solution, &scene, &error), &error);
     assert_int_equal(solution.factors.sky_rays, 0);
     for (size_t p = 0; p < solution.patches.count; p++)
         for (int c = 0; c < 3; c++)
             check_relative(solution.radiosity[p][c], wall.exitance[c] / (1 - wall.reflectance[c]),
-                           1e-7); // residual / (1 - rho)
+                           5e-5 / (1 - wall.reflectance[c]));
     alb_solution_free(&solution);
     alb_scene_free(&scene);
 }
@@ -77,7 +78,8 @@ static void any_scattering_on_a_sphere_is_exact(void **state)
     alb_error error = {0};
     alb_scatter scatter;
     double areas[N] = {0}, ones[N][3], light[N][3], dark[N][3] = {{0}}, first[N][3], rows[N][3], found[N][3];
-    alb_form_factors f = {.patch_count = N, .rays = RAYS, .hits = calloc(N * RAYS, sizeof(uint32_t))};
+    alb_form_factors f;
+    uint32_t *hits = calloc(N * RAYS, sizeof *hits);
     random_scatter(&scatter, N, 21);
     for (int q = 0; q < RAYS; q++) {
         alb_random random = alb_random_at(22, 0, (uint64_t)q);
@@ -85,8 +87,10 @@ static void any_scattering_on_a_sphere_is_exact(void **state)
         const uint32_t hit = (uint32_t)(N * u * u); // unequal: from 1 to over 100 rays
         areas[hit] += 1;
         for (size_t p = 0; p < N; p++)
-            f.hits[p * RAYS + (size_t)q] = hit;
+            hits[p * RAYS + (size_t)q] = hit;
     }
+    check_ok(alb_form_factors_from_hits(&f, hits, N, RAYS, &error), &error);
+    free(hits);
     for (size_t p = 0; p < N; p++) {
         alb_random random = alb_random_at(23, 0, p);
         for (int c = 0; c < 3; c++) {
@@ -96,7 +100,7 @@ static void any_scattering_on_a_sphere_is_exact(void **state)
     }
     alb_radiosity_report report;
     check_ok(alb_radiosity_solve(found, &report, (const double(*)[3])light, (const double(*)[3])dark, &scatter, &f,
-                                 areas, 1e-12, &error),
+                                 areas, 1e-6, &error),
              &error);
     assert_true(report.iterations < 12); // F has rank one: the space is exhausted after two products
     alb_scatter_apply(first, &scatter, (const double(*)[3])light);
@@ -108,9 +112,10 @@ static void any_scattering_on_a_sphere_is_exact(void **state)
             kept += areas[p] / RAYS * rows[p][c];
         }
         for (size_t p = 0; p < N; p++)
-            check_relative(found[p][c], first[p][c] + rows[p][c] * lit / (1 - kept), 1e-9);
+            check_relative(found[p][c], first[p][c] + rows[p][c] * lit / (1 - kept),
+                           1e-5); // residual / (1 - kept), at most 20 times
     }
-    free(f.hits);
+    alb_form_factors_free(&f);
     alb_scatter_free(&scatter);
 }
 
@@ -270,7 +275,7 @@ static void white_furnace(void **state)
     scene.lights[0] = (alb_light){.kind = ALB_LIGHT_ENVIRONMENT, .radiance = {1, 1, 1}};
     check_ok(alb_solution_create(&s, &scene, &error), &error);
     for (size_t p = 0; p < s.patches.count; p++)
-        check_relative(s.radiosity[p][p % 3], M_PI, 1e-7); // the residual over the smallest share of sky
+        check_relative(s.radiosity[p][p % 3], M_PI, 1e-5); // the residual over the smallest share of sky
     alb_solution_free(&s);
     alb_scene_free(&scene);
 }
