@@ -17,7 +17,7 @@ const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "ligh
 
 // A change of the direct light, |E - E'| / |E|, below which the last solution is worth a product as a start.
 static const double small_change = 0.3;
-static const alb_solver default_solver = ALB_SOLVER_GMRES;
+static const alb_solver default_solver = ALB_SOLVER_TWO_LEVEL;
 
 static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
