@@ -2,6 +2,7 @@
 #include "base/record.h"
 #include "fit/ballistic.h"
 #include "fit/energy.h"
+#include "fit/material_check.h"
 #include "fit/offset.h"
 #include "fit/profile.h"
 #include "fit/search.h"
@@ -278,8 +279,6 @@ static bool check_covariance(const alb_fitted *fitted, int n, alb_node node, alb
     return true;
 }
 
-static const char estimate_keys[] = "value sd interval_95 cramer_rao_sd identifiable because";
-
 static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
 {
     alb_profile *profile = &fitted->profile;
@@ -292,7 +291,7 @@ static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
     for (int p = 0; p < n; p++) {
         const char *name = alb_form_parameter_name(profile->form, p);
         strncat(strncat(names, name, 60), " ", 2);
-        if (!alb_node_object(&one, parameters, name, error) || !alb_node_allow(one, estimate_keys, error) ||
+        if (!alb_estimate_check(parameters, name, error) || !alb_node_object(&one, parameters, name, error) ||
             !alb_node_number(&profile->parameters[p], one, "value", -1e300, 1e300, error) ||
             (fitted->identifiable && !alb_node_number(&fitted->sd[p], one, "sd", 0, 1e300, error)))
             return false;
@@ -327,8 +326,8 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
     if (!alb_form_from_name(&fitted->profile.form, form))
         return alb_node_fail(error, node, "form", "unknown form '%s'", form);
     if (!alb_node_boolean(&fitted->identifiable, node, "identifiable", error) ||
-        !read_parameters(fitted, node, error) || !alb_node_object(&total, node, "total", error) ||
-        !alb_node_allow(total, estimate_keys, error) ||
+        !read_parameters(fitted, node, error) || !alb_estimate_check(node, "total", error) ||
+        !alb_outcome_check(node, error) || !alb_node_object(&total, node, "total", error) ||
         !alb_node_number(&fitted->total, total, "value", 0, 1e300, error) ||
         (fitted->identifiable && !alb_node_number(&fitted->total_sd, total, "sd", 0, 1e300, error)) ||
         !alb_node_number(&fitted->chi_square, node, "chi_square", 0, 1e300, error) ||

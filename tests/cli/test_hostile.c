@@ -110,7 +110,7 @@ static void files_that_cannot_grow(void **state)
 {
     (void)state;
     save_text("hostile/full.exr", "old");
-    const int status = shell("(trap '' XFSZ; ulimit -f 1; exec timeout 60 '%s' render hostile/scene.json -o "
+    const int status = shell("(trap '' XFSZ; ulimit -f 1; exec timeout 600 '%s' render hostile/scene.json -o "
                              "hostile/full.exr --mesh hostile/full.ply 2>/dev/null >/dev/null)",
                              ALB_PROGRAM);
     assert_int_equal(WEXITSTATUS(status), ALB_ACCESS);
@@ -176,7 +176,7 @@ static void results_that_do_not_fit(void **state)
     assert_int_equal(run("fit --table hostile/profile.csv --side reflection -o hostile/whole --json") % ALB_UNDECIDED,
                      0);
     assert_int_equal(shell("cp -r hostile/whole hostile/before"), 0);
-    const int status = shell("(trap '' XFSZ; ulimit -f 16; exec timeout 60 '%s' fit --table hostile/other.csv --side "
+    const int status = shell("(trap '' XFSZ; ulimit -f 16; exec timeout 600 '%s' fit --table hostile/other.csv --side "
                              "reflection -o hostile/whole 2>/dev/null >/dev/null)",
                              ALB_PROGRAM);
     assert_int_equal(WEXITSTATUS(status), ALB_ACCESS);

@@ -1,7 +1,7 @@
 // Energy: whatever the readings, no more leaves than came in.
 #include "one_side.h"
 
-// A profile seen from 0.1 mm to range_mm.
+// 60 rings out to range_mm.
 static one_side seen(double range_mm, double noise)
 {
     return (one_side){.readings = 60, .range_mm = range_mm, .noise = noise, .floor = 0.01};
