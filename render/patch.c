@@ -26,7 +26,7 @@ bool alb_patches_create(alb_patches *patches, const alb_mesh *mesh, alb_error *e
         patches->normals[i] = alb_unit(cross);
         patches->areas_mm2[i] = 0.5 * alb_length(cross);
         for (int k = 0; k < 3; k++) {
-            const alb_vector at = corner(mesh, i, k);
+            const alb_vector at = alb_sub(corner(mesh, i, k), corner(mesh, 0, 0)); // wherever the mesh stands
             largest = fmax(largest, fmax(fabs(at.x), fmax(fabs(at.y), fabs(at.z))));
         }
     }

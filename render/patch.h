@@ -7,7 +7,7 @@ typedef struct alb_patches {
     size_t count;
     alb_vector *centroids, *normals; // mm; unit, out of the front
     double *areas_mm2;
-    double offset_mm; // how far a ray starts above its patch: a few float roundings of the largest coordinate
+    double offset_mm; // how far a ray starts above its patch: a few float roundings of the extent
 } alb_patches;
 
 bool alb_patches_create(alb_patches *patches, const alb_mesh *mesh, alb_error *error);

@@ -1,5 +1,6 @@
-// Embree's robust mode: no ray slips between triangles that share an edge. Single precision: points nearer than
-// about 1e-7 of the largest coordinate cannot be told apart, which is why rays start offset (render/patch.h).
+// Embree's robust mode: no ray slips between triangles that share an edge. Single precision about the middle of the
+// mesh: points nearer than about 1e-7 of its extent cannot be told apart, which is why rays start offset
+// (render/patch.h).
 // Stops being true for meshes whose extent over detail exceeds 1e6.
 #include "render/tracer.h"
 #if __has_include(<embree4/rtcore.h>)
@@ -15,7 +16,18 @@ static bool count_bytes(void *user, ssize_t bytes, bool post)
     return true;
 }
 
-static bool fill(RTCGeometry geometry, const alb_mesh *mesh)
+static alb_vector middle_of(const alb_mesh *mesh)
+{
+    alb_vector low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        const alb_vector v = mesh->vertices[i];
+        low = (alb_vector){fmin(low.x, v.x), fmin(low.y, v.y), fmin(low.z, v.z)};
+        high = (alb_vector){fmax(high.x, v.x), fmax(high.y, v.y), fmax(high.z, v.z)};
+    }
+    return mesh->vertex_count ? alb_times(0.5, alb_add(low, high)) : (alb_vector){0};
+}
+
+static bool fill(RTCGeometry geometry, const alb_mesh *mesh, alb_vector middle)
 {
     float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
                                               mesh->vertex_count);
@@ -24,9 +36,10 @@ static bool fill(RTCGeometry geometry, const alb_mesh *mesh)
     if (!vertices || !faces)
         return false;
     for (size_t i = 0; i < mesh->vertex_count; i++) {
-        vertices[3 * i] = (float)mesh->vertices[i].x;
-        vertices[3 * i + 1] = (float)mesh->vertices[i].y;
-        vertices[3 * i + 2] = (float)mesh->vertices[i].z;
+        const alb_vector v = alb_sub(mesh->vertices[i], middle);
+        vertices[3 * i] = (float)v.x;
+        vertices[3 * i + 1] = (float)v.y;
+        vertices[3 * i + 2] = (float)v.z;
     }
     for (size_t i = 0; i < mesh->face_count; i++)
         for (size_t k = 0; k < 3; k++)
@@ -36,7 +49,7 @@ static bool fill(RTCGeometry geometry, const alb_mesh *mesh)
 
 bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *error)
 {
-    *tracer = (alb_tracer){0};
+    *tracer = (alb_tracer){.middle = middle_of(mesh)};
     RTCDevice device = rtcNewDevice(NULL);
     if (!device) {
         const enum RTCError code = rtcGetDeviceError(NULL);
@@ -48,7 +61,7 @@ bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *erro
     RTCScene scene = rtcNewScene(device);
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     tracer->scene = scene;
-    bool ok = scene && geometry && fill(geometry, mesh);
+    bool ok = scene && geometry && fill(geometry, mesh, tracer->middle);
     if (ok) {
         rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
@@ -75,8 +88,9 @@ void alb_tracer_free(alb_tracer *tracer)
     *tracer = (alb_tracer){0};
 }
 
-static struct RTCRay ray_of(alb_vector origin, alb_vector direction, float far)
+static struct RTCRay ray_of(const alb_tracer *tracer, alb_vector from, alb_vector direction, float far)
 {
+    const alb_vector origin = alb_sub(from, tracer->middle);
     return (struct RTCRay){.org_x = (float)origin.x,
                            .org_y = (float)origin.y,
                            .org_z = (float)origin.z,
@@ -89,7 +103,7 @@ static struct RTCRay ray_of(alb_vector origin, alb_vector direction, float far)
 
 bool alb_tracer_closest(alb_hit *hit, const alb_tracer *tracer, alb_vector origin, alb_vector direction)
 {
-    struct RTCRayHit ray = {.ray = ray_of(origin, direction, INFINITY), .hit.geomID = RTC_INVALID_GEOMETRY_ID};
+    struct RTCRayHit ray = {.ray = ray_of(tracer, origin, direction, INFINITY), .hit.geomID = RTC_INVALID_GEOMETRY_ID};
 #if RTC_VERSION_MAJOR >= 4
     rtcIntersect1(tracer->scene, &ray, NULL);
 #else
@@ -111,7 +125,7 @@ bool alb_tracer_closest(alb_hit *hit, const alb_tracer *tracer, alb_vector origi
 bool alb_tracer_blocked(const alb_tracer *tracer, alb_vector from, alb_vector to)
 {
     // the far end stops short of a surface on which `to` lies
-    struct RTCRay ray = ray_of(from, alb_sub(to, from), 1 - 0x1p-18f);
+    struct RTCRay ray = ray_of(tracer, from, alb_sub(to, from), 1 - 0x1p-18f);
 #if RTC_VERSION_MAJOR >= 4
     rtcOccluded1(tracer->scene, &ray, NULL);
 #else

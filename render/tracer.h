@@ -5,6 +5,7 @@
 typedef struct alb_tracer {
     void *device, *scene; // Embree handles
     int64_t bytes;        // memory Embree holds; its own count
+    alb_vector middle;    // of the mesh: Embree's origin
 } alb_tracer;
 
 typedef struct alb_hit {
