@@ -150,6 +150,8 @@ static bool print_json(const alb_scene *scene, const alb_solution *s, double vie
     alb_json_integer(&json, "rays_per_patch", s->factors.rays);
     alb_json_integer(&json, "iterations", s->report.iterations);
     alb_json_number(&json, "residual", s->report.residual);
+    alb_json_number(&json, "radiosity_bound_percent", 100 * s->bound);
+    alb_json_number(&json, "rays_error_percent", s->rays_error_percent);
     alb_json_number(&json, "largest_row_sum", s->row_sum);
     alb_json_number(&json, "largest_column_sum", s->column_sum);
     alb_json_object(&json, "flux");
@@ -180,8 +182,9 @@ static bool report(const outputs *out, const alb_scene *scene, const alb_solutio
         total_s += s->seconds[i];
     if (out->json)
         return print_json(scene, s, view_s, exposure, error);
-    printf("%s: %zu patches, %d products to residual %.1e, largest row sum %.4f, %.1f s\n", out->picture,
-           s->patches.count, s->report.iterations, s->report.residual, s->row_sum, total_s);
+    printf("%s: %zu patches, %d products to residual %.1e, rays' error %.2f %%, largest row sum %.4f, %.1f s\n",
+           out->picture, s->patches.count, s->report.iterations, s->report.residual, s->rays_error_percent, s->row_sum,
+           total_s);
     return true;
 }
 
