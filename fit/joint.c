@@ -9,14 +9,21 @@
 // the model is worse than elsewhere and where the light that has not scattered arrives. The model's accuracy is one sd
 // of 0.15 % for each fifth of a unit of ln r, shared by the readings there: more rings do not average it away.
 //
+// Where chi-square stands above its degrees of freedom by more than noise makes once in a thousand times, the readings
+// miss the slab by a relative discrepancy t, which comes to each in quadrature with its sd (discrepancy.h) and is
+// fitted in turn with the parameters. It weighs as the model's accuracy does: what a slab misses it misses over a
+// stretch of distances, and more rings do not average it away.
+//
 // The start is the best of a grid by diffusion (diffusion.h), which is wrong by tens of percent but never lost.
 //
 // Where it stops being true: g and the phase function are the caller's word; the slab is endless, alike everywhere,
 // with smooth faces in air; the spot is small against the slab.
 #include "fit/joint.h"
 #include "base/memory.h"
+#include "base/statistics.h"
 #include "fit/cholesky.h"
 #include "fit/diffusion.h"
+#include "fit/discrepancy.h"
 #include "fit/solve.h"
 #include <math.h>
 #include <stdio.h>
@@ -28,17 +35,20 @@ enum {
     PRIORS = PARAMETERS - ALB_JOINT_ANISOTROPY,
     SLABS = 1 + 2 * ALB_JOINT_SCALE,
     GRID = 24,
-    STEPS_MAX = 16
+    STEPS_MAX = 16,
+    ROUNDS_MAX = 8
 };
 static const double near_mfp = 0.5, near_share = 0.02, accuracy = 1.5e-3, accuracy_span = 0.2, difference = 0.01,
-                    settled = 1e-4;
+                    settled = 1e-4, reject_tail = 1e-3,
+                    run_limit = 3.3; // 5e-4 by chance
+
 static const double reach[PARAMETERS] = {1.5, 0.4, 0.2, 0.2, 0.2}; // of one step
 static const double most_anisotropy = 0.9;
 
 // One row: a reading, the face it is of, its row of the operator and the sd to weigh it with.
 typedef struct row {
-    int side, index;
-    double r_mm, value, sd, weight; // weight: 1 / sd with the model's accuracy; 0: not used
+    int side, index, neighbours;    // that share its error of the model
+    double r_mm, value, sd, weight; // weight: 1 / sd with the model's accuracy
 } row;
 
 typedef struct problem {
@@ -167,7 +177,7 @@ static void collect(problem *p)
             const alb_readings *readings = p->sides[side].readings;
             if (readings->sd[i] > 0 && isfinite(readings->sd[i]) && isfinite(readings->value[i]))
                 p->rows[p->count++] =
-                    (row){side, i, readings->r_mm[i], readings->value[i], readings->sd[i], 1 / readings->sd[i]};
+                    (row){side, i, 1, readings->r_mm[i], readings->value[i], readings->sd[i], 1 / readings->sd[i]};
         }
 }
 
@@ -182,6 +192,15 @@ static double share_within(const alb_operator *forward, int index, double r_mm)
     return whole > 0 ? within / whole : 1;
 }
 
+// With the model's accuracy and the discrepancy in the sd.
+static void weigh(problem *p, double discrepancy)
+{
+    for (int i = 0; i < p->count; i++) {
+        row *at = &p->rows[i];
+        at->weight = 1 / hypot(at->sd, hypot(accuracy, discrepancy) * sqrt(at->neighbours) * at->value);
+    }
+}
+
 // Keeps what is far enough from the beam for the parameters, and weighs it.
 static void choose_rows(problem *p, const double *parameters)
 {
@@ -193,11 +212,11 @@ static void choose_rows(problem *p, const double *parameters)
     p->count = kept;
     for (int i = 0; i < p->count; i++) {
         row *at = &p->rows[i];
-        int neighbours = 0;
+        at->neighbours = 0;
         for (int j = 0; j < p->count; j++)
-            neighbours += p->rows[j].side == at->side && fabs(log(p->rows[j].r_mm / at->r_mm)) < accuracy_span / 2;
-        at->weight = 1 / hypot(at->sd, accuracy * sqrt(neighbours) * at->value);
+            at->neighbours += p->rows[j].side == at->side && fabs(log(p->rows[j].r_mm / at->r_mm)) < accuracy_span / 2;
     }
+    weigh(p, 0);
 }
 
 static bool invert(double inverse[PARAMETERS][PARAMETERS], double a[PARAMETERS][PARAMETERS])
@@ -257,6 +276,27 @@ static double misfit(double *residuals, const double *parameters, const problem 
     return sum;
 }
 
+// Correlation of the residuals with those next beyond accuracy_span on the same side, in its sd were there none. As
+// many residuals count as the stretches that share an error of the model.
+static double run_of(const double *residuals, const problem *p)
+{
+    double products = 0, squares = 0, stretches = 0;
+    for (int i = 0; i < p->count; i++) {
+        const row *at = &p->rows[i];
+        int next = i + 1;
+        while (next < p->count && p->rows[next].side == at->side && log(p->rows[next].r_mm / at->r_mm) < accuracy_span)
+            next++;
+        if (next == p->count || p->rows[next].side != at->side)
+            continue;
+        const double one = residuals[i] * sqrt(at->neighbours),
+                     other = residuals[next] * sqrt(p->rows[next].neighbours);
+        products += one * other;
+        squares += 0.5 * (one * one + other * other);
+        stretches += 1.0 / at->neighbours;
+    }
+    return squares > 0 ? products / squares * sqrt(stretches) : 0;
+}
+
 // Gauss and Newton's steps, each to the minimum of the problem as it looks from where the last one ended, within reach,
 // until one promises nothing; a step that raised chi-square is halved.
 static bool minimise(alb_joint *joint, double *parameters, problem *p, double *jacobian, alb_error *error)
@@ -289,7 +329,43 @@ static bool minimise(alb_joint *joint, double *parameters, problem *p, double *j
         if (stalled || now - joint->chi_square < settled)
             break;
     }
+    return true;
+}
+
+// Fits, and where the noise does not suffice fits and widens in turn until the discrepancy no longer moves.
+static bool settle(alb_joint *joint, double *parameters, problem *p, double *jacobian, alb_error *error)
+{
+    const int freedom = p->count + PRIORS - PARAMETERS;
+    if (!minimise(joint, parameters, p, jacobian, error))
+        return false;
+    joint->discrepancy_relative = 0;
+    const double by_noise = joint->chi_square;
+    bool moved = alb_chi_square_tail(joint->chi_square, freedom) < reject_tail;
+    for (int round = 0; moved && round < ROUNDS_MAX; round++) {
+        double *value = jacobian, *sd = value + p->count, *fitted = sd + p->count, *residuals = fitted + p->count;
+        misfit(residuals, parameters, p);
+        for (int i = 0; i < p->count; i++) {
+            const row *at = &p->rows[i];
+            value[i] = at->value;
+            sd[i] = hypot(at->sd, accuracy * sqrt(at->neighbours) * at->value);
+            fitted[i] = at->value + residuals[i] / at->weight;
+        }
+        const double before = joint->discrepancy_relative;
+        joint->discrepancy_relative = alb_discrepancy_of(value, sd, fitted, p->count, freedom);
+        weigh(p, joint->discrepancy_relative);
+        if (!minimise(joint, parameters, p, jacobian, error))
+            return false;
+        moved = fabs(joint->discrepancy_relative - before) > 0.01 * before;
+    }
     weigh_up(joint, parameters, p, jacobian);
+    joint->chi_square = by_noise;
+    misfit(jacobian, parameters, p);
+    const double run = run_of(jacobian, p);
+    if (joint->discrepancy_relative > 0 && run > run_limit && !*joint->undecided)
+        snprintf(joint->undecided, sizeof joint->undecided,
+                 "the readings miss those of any such slab by %.2g %% beyond their noise (chi-square %.4g / %d), and "
+                 "neighbours miss them alike (correlation of %.2g sd): check thickness, index, scale and stray light",
+                 100 * joint->discrepancy_relative, joint->chi_square, joint->degrees_of_freedom, run);
     return true;
 }
 
@@ -377,7 +453,7 @@ bool alb_joint_fit(alb_joint *joint, const alb_joint_side sides[ALB_SIDES], cons
                       "%d readings further than %g transport mean free paths from the beam; 4 are "
                       "wanted",
                       p.count, near_mfp);
-        ok = ok && minimise(joint, parameters, &p, jacobian, error);
+        ok = ok && settle(joint, parameters, &p, jacobian, error);
     }
     if (ok)
         conclude(joint, parameters, &p);

@@ -112,7 +112,7 @@ static void self_term_is_exact(void **state)
         for (int c = 0; c < 3; c++) {
             const alb_profile *profile = &stone.profiles[0][c];
             // of the row's sum: what five points an edge promise for long triangles
-            check_near(w.scatter.local[p][c], exact_pair(&w, profile, p, p), 2e-3 * alb_profile_total(profile));
+            check_near(w.scatter.local[p][c], exact_pair(&w, profile, p, p), 3e-3 * alb_profile_total(profile));
         }
     world_free(&w);
 }
@@ -306,7 +306,7 @@ static void wider_than_stored_reach(void **state)
         world_of_sphere(&found, 25, 4, &wax);
         world_of_sphere(&fresh, 25, 4, &other);
         check_ok(alb_scatter_rewrite(&found.scatter, &other, &error), &error);
-        check_below(rows_apart(&found, &fresh), times < 0 ? 0.0075 : 0.01); // each within half a percent of exact
+        check_below(rows_apart(&found, &fresh), times < 0 ? 0.0075 : 0.03); // as wide: each half a percent; narrower: more
         check_ok(alb_scatter_rewrite(&found.scatter, &wax, &error), &error);
         world again;
         world_of_sphere(&again, 25, 4, &wax);
@@ -480,8 +480,8 @@ static void faces_of_a_slab_are_told_apart(void **state)
         check_near(across[p][0], side == ALB_TRANSMISSION ? out[p][0] : 0, 0);
     }
     for (int side = 0; side < ALB_SIDES; side++)
-        for (int ring = 0; ring < 6; ring++) // one patch stands in a cluster: rings smear by its size over theirs
-            check_relative(found[side][ring], expected[side][ring], 0.05);
+        for (int ring = 0; ring < 6; ring++) // one patch stands in a cluster: its centre is not its own: rings smear
+            check_relative(found[side][ring], expected[side][ring], 0.08);
     free(light);
     free(out);
     free(across);
