@@ -20,9 +20,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The least squares of kernel.c leave sqrt(pi / (3 links)) of one point's light and, for even light, where second
-// moments cancel what is left of it, about 0.5 / links.
-static double links_for(double error_wanted) { return fmin(fmax(0.5 / error_wanted, 20), 3000); }
+// Links of one row on a plane. With 66 of them e^(-b r) misses 0.05 % of even light and 2 % rms of one point's, less on
+// meshes that resolve it with less than a few hundred patches.
+static double links_for(double error_wanted) { return fmin(fmax(0.33 / error_wanted, 20), 3000); }
 
 struct alb_scatter_parts {
     alb_forest forest;
@@ -76,7 +76,7 @@ static bool make_kernels(alb_scatter *scatter, const alb_patches *patches, const
     }
     for (size_t k = 0; ok && k < p->kernel_count; k++) {
         p->kernels[k].largest_spread_mm2 = (float)(selves[k] * selves[k] / 8); // corners no further: at most this
-        ok = alb_scatter_kernel_create(&p->kernels[k], reaches[k], 6 * selves[k], error);
+        alb_scatter_kernel_span(&p->kernels[k], reaches[k], 6 * selves[k]);
     }
     free(reaches);
     free(selves);
@@ -94,11 +94,19 @@ static bool make_links(alb_scatter *scatter, const alb_patches *patches, const a
         alb_scatter_kernel_needs_find(&needs[k], &p->kernels[k],
                                       surfaces[p->kernels[k].surface].profiles[p->kernels[k].side],
                                       links_for(error_wanted));
-    const bool ok =
-        alb_links_create(&p->links, &p->forest, patches, p->of_bodies, p->kernels, needs, error_wanted, error);
+    bool ok = alb_links_create(&p->links, &p->forest, patches, p->of_bodies, p->kernels, needs, error_wanted, error);
     free(needs);
-    for (size_t b = 0; b < p->links.block_count; b++)
-        scatter->link_count += p->links.blocks[b].link_count;
+    for (size_t k = 0; k < p->kernel_count; k++)
+        p->kernels[k].first_used = p->kernels[k].octave_count - 1;
+    for (size_t b = 0; b < p->links.block_count; b++) {
+        const alb_link_block *block = &p->links.blocks[b];
+        scatter->link_count += block->link_count;
+        for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; run++)
+            if (run->octave < p->kernels[run->kernel].first_used)
+                p->kernels[run->kernel].first_used = run->octave;
+    }
+    for (size_t k = 0; ok && k < p->kernel_count; k++)
+        ok = alb_scatter_kernel_create(&p->kernels[k], p->kernels[k].first_used, error);
     return ok;
 }
 

@@ -5,6 +5,7 @@
 // by the parallel-axis rule, weighted by area. They make the second order of what a cluster sends: for a profile s seen
 // from distance r, along the line of sight and across it,
 //     mean s = s(r) + v_along s'' / 2 + v_across s' / (2 r)
+// Light that is uneven over the cluster adds s' times its first moment along the line of sight.
 // Slab: the two faces are the patches whose normal lies within 10 degrees of the direction that carries most area.
 #include "render/scatter_forest.h"
 #include "base/memory.h"
@@ -158,7 +159,9 @@ static void build(const builder *b, uint32_t node, uint32_t first_leaf, uint32_t
         merge(cluster, cluster + 1, cluster + 2 * (size_t)left);
     }
     cluster->spread_mm2 = 0.5F * (cluster->moments[0] + cluster->moments[1] + cluster->moments[2]);
-    b->forest->nodes[node][3] = cluster->spread_mm2;
+    b->forest->nodes[node].spread_mm2 = cluster->spread_mm2;
+    for (int k = 0; k < 3; k++)
+        b->forest->nodes[node].moments[k][3] = cluster->centre_mm[k];
 }
 
 // The patches of the body, face after face; trees that have any.
@@ -245,11 +248,11 @@ size_t alb_forest_bytes(const alb_forest *forest)
 static void gather(alb_forest *forest, const double (*irradiance)[3], uint32_t node, uint32_t first_leaf,
                    uint32_t count)
 {
-    float *sum = forest->nodes[node];
+    alb_scatter_node *sum = &forest->nodes[node];
     if (count == 1) {
         const double area = (double)forest->areas_mm2[first_leaf], *light = irradiance[forest->patches[first_leaf]];
         for (int c = 0; c < 3; c++)
-            sum[c] = (float)(area * light[c]);
+            sum->light[c] = (float)(area * light[c]);
         return;
     }
     const uint32_t left = alb_left_count(count);
@@ -257,8 +260,16 @@ static void gather(alb_forest *forest, const double (*irradiance)[3], uint32_t n
     gather(forest, irradiance, node + 1, first_leaf, left);
     gather(forest, irradiance, node + 2 * left, first_leaf + left, count - left);
 #pragma omp taskwait
+    const alb_scatter_node *const parts[2] = {sum + 1, sum + 2 * (size_t)left};
     for (int c = 0; c < 3; c++)
-        sum[c] = forest->nodes[node + 1][c] + forest->nodes[node + 2 * left][c];
+        sum->light[c] = parts[0]->light[c] + parts[1]->light[c];
+    for (int k = 0; k < 3; k++) {
+        const float first = parts[0]->moments[k][3] - sum->moments[k][3],
+                    second = parts[1]->moments[k][3] - sum->moments[k][3];
+        for (int c = 0; c < 3; c++)
+            sum->moments[k][c] = parts[0]->moments[k][c] + first * parts[0]->light[c] + parts[1]->moments[k][c] +
+                                 second * parts[1]->light[c];
+    }
 }
 
 void alb_forest_gather(alb_forest *forest, const double (*irradiance)[3])

@@ -17,6 +17,13 @@ typedef struct alb_cluster {
     uint32_t leaf; // one near the centre
 } alb_cluster;
 
+// A cluster as a product sees it. The light, area times irradiance of R, G and B, and its first moments about the
+// centre along x, y and z, in which the last element stays: the centre.
+typedef struct alb_scatter_node {
+    float light[3], spread_mm2;
+    float moments[3][4];
+} alb_scatter_node;
+
 typedef struct alb_tree {
     uint32_t body, first_node, first_leaf, leaf_count;
     uint16_t surface;
@@ -30,10 +37,10 @@ typedef struct alb_tree {
 typedef struct alb_forest {
     size_t tree_count, leaf_count, node_count;
     alb_tree *trees;
-    uint32_t *patches;     // of the leaves
-    float *areas_mm2;      // of the leaves
-    float (*nodes)[4];     // workspace of a product: area times irradiance, R, G, B; and spread_mm2, which stays
-    alb_cluster *clusters; // of the nodes; only while links are made
+    uint32_t *patches;       // of the leaves
+    float *areas_mm2;        // of the leaves
+    alb_scatter_node *nodes; // workspace of a product
+    alb_cluster *clusters;   // of the nodes; only while links are made
 } alb_forest;
 
 static inline uint32_t alb_left_count(uint32_t count)

@@ -13,10 +13,10 @@ enum {
 typedef struct alb_scatter_kernel {
     uint16_t surface;
     alb_side side;
-    int first_octave, octave_count;
-    float largest_spread_mm2; // of a patch
-    // [octave][code]: s(d) of R, G, B and a zero, then s''(d) / 2 likewise
-    float (*values)[8];
+    int first_octave, octave_count, first_used; // tables begin at first_used
+    float largest_spread_mm2;                   // of a patch
+    // [octave - first_used][code]: s(d) of R, G, B and a zero, then s'(d), s''(d) / 2 and nothing likewise
+    float (*values)[16];
     void *storage;
     // P(r) / r of R, G, B, P(r) = integral_0^r s r dr, at r = (knot / ALB_DISC_KNOTS)^2 near_mm
     double near_mm;
@@ -28,11 +28,13 @@ typedef struct alb_scatter_kernel_needs {
     int first_octave;
     float size2_mm2[ALB_KERNEL_BINS]; // squared size that a cluster may have at this distance and further out
     float shares[ALB_KERNEL_BINS][3]; // s / total, 1/mm^2
-    float slopes[ALB_KERNEL_BINS][3]; // -s' / s, 1/mm
+    float slopes[ALB_KERNEL_BINS][3]; // |s'| / s, 1/mm
 } alb_scatter_kernel_needs;
 
 // For distances up to reach_mm, in exact rules up to near_mm.
-bool alb_scatter_kernel_create(alb_scatter_kernel *kernel, double reach_mm, double near_mm, alb_error *error);
+void alb_scatter_kernel_span(alb_scatter_kernel *kernel, double reach_mm, double near_mm);
+// Tables from octave first_used on.
+bool alb_scatter_kernel_create(alb_scatter_kernel *kernel, int first_used, alb_error *error);
 void alb_scatter_kernel_free(alb_scatter_kernel *kernel);
 // Fills the tables.
 void alb_scatter_kernel_write(alb_scatter_kernel *kernel, const alb_profile profiles[3]);

@@ -7,7 +7,7 @@
 // A patch is taken whole or in 4, 16 or (long ones) 64 equal triangles: the least that leaves, of its share of a row's
 // sum (s A / total), with b = -s' / s and a part's variances v1 >= v2, h^2 = 6 (v1 + v2),
 //     (b h)^4 / 1920 + min(b d, 1) (h / d)^4 / 500 + b^2 (v1 - v2) / 40
-// no more than a tenth of the error wanted; where the smallest parts leave four times that, exactly (scatter_rule.c).
+// no more than 0.15 of the error wanted; where the smallest parts leave four times that, exactly (scatter_rule.c).
 // The first term is what second moments leave of an exponential, the second what they leave of a cusp at no distance,
 // the third that the variance along the line of sight is not v.
 //
@@ -24,6 +24,7 @@ enum { PARTS_MAX = 64, OCTAVES = ALB_KERNEL_BINS / 4, BUCKETS = ALB_SIDES * OCTA
 typedef struct link {
     uint32_t node;
     uint16_t bucket; // (side, octave, level)
+    int8_t direction[4];
     size_t codes;
 } link;
 
@@ -157,6 +158,26 @@ static void encode(uint8_t codes[ALB_BLOCK], const float distances[ALB_BLOCK], f
     }
 }
 
+// Direction from the block to the cluster, through a slab along its faces, and the cluster's variance along it.
+static void aim(int8_t direction[4], const viewer *v, const alb_cluster *cluster, int side)
+{
+    float to[3];
+    const float *m = cluster->moments;
+    for (int k = 0; k < 3; k++)
+        to[k] = cluster->centre_mm[k] - v->centre[k];
+    if (side == ALB_TRANSMISSION)
+        project(to, v->tree->axis);
+    const float x = to[0], y = to[1], z = to[2], squared = x * x + y * y + z * z;
+    const float along = m[0] * x * x + m[1] * y * y + m[2] * z * z + 2 * (m[3] * x * y + m[4] * x * z + m[5] * y * z);
+    memset(direction, 0, 4);
+    direction[3] = 64;
+    if (!(squared > 0))
+        return;
+    for (int k = 0; k < 3; k++)
+        direction[k] = (int8_t)lrintf(INT8_MAX * to[k] / sqrtf(squared));
+    direction[3] = (int8_t)fminf(rintf(64 * along / (squared * cluster->spread_mm2)), INT8_MAX);
+}
+
 // left_out: bits of the rows that are the source itself or take it exactly.
 static void add_link(const viewer *v, uint32_t node, int side, int level, unsigned left_out)
 {
@@ -188,8 +209,11 @@ static void add_link(const viewer *v, uint32_t node, int side, int level, unsign
     int octave = ilogbf(fmaxf(furthest, 1e-30F)) + 1 - kernel->first_octave;
     octave = octave < 0 ? 0 : octave < kernel->octave_count ? octave : kernel->octave_count - 1;
     const float per_mm = ldexpf(ALB_CODES - 2, -(kernel->first_octave + octave));
-    work->links[work->count++] =
-        (link){node, (uint16_t)((side * OCTAVES + octave) * ALB_LEVELS + level), work->code_count};
+    link *added = &work->links[work->count++];
+    *added = (link){node, (uint16_t)((side * OCTAVES + octave) * ALB_LEVELS + level), {0}, work->code_count};
+    aim(added->direction, v, cluster, side);
+    if (level) // of parts all round
+        added->direction[3] = 64;
     for (int part = 0; part < count; part++) {
         encode(work->codes + work->code_count, distances[part], per_mm);
         work->code_count += ALB_BLOCK;
@@ -261,18 +285,20 @@ static int level_of(const viewer *v, const alb_cluster *cluster, int side, uint3
         gap = (float)to_triangle(v->patches->centroids[v->forest->patches[v->first_leaf + row]], t);
     }
     const int bin = alb_scatter_kernel_bin(needs, gap);
-    const float allowed = 0.1F * (float)v->error_wanted, from = fmaxf(distance, 1e-15F);
-    int parts = 1;
+    const float allowed = 0.15F * (float)v->error_wanted, from = fmaxf(distance, 1e-15F);
     float variances[2], left;
+    variances_of_part(variances, cluster, PARTS_MAX / 4);
+    const int most = is_long(variances, cluster, PARTS_MAX / 4) ? PARTS_MAX : PARTS_MAX / 4;
+    int parts = 1;
     for (int c = 0; c < 3; c++)
         for (;; parts *= 4) {
             variances_of_part(variances, cluster, parts);
             left = needs->shares[bin][c] * cluster->area_mm2 *
                    fminf(left_of_part(variances, needs->slopes[bin][c], from), 1);
-            if (left <= allowed)
+            if (left > 4 * allowed && parts == most && distance <= 3 * cluster->radius_mm)
+                return EXACT;
+            if (left <= allowed || parts == most)
                 break;
-            if (parts >= (is_long(variances, cluster, parts) ? PARTS_MAX : PARTS_MAX / 4))
-                return left > 4 * allowed && distance <= 3 * cluster->radius_mm ? EXACT : parts == PARTS_MAX ? 5 : 3;
         }
     variances_of_part(variances, cluster, parts);
     if (is_long(variances, cluster, parts))
@@ -407,7 +433,7 @@ static bool allocate_block(alb_link_block *block, const workspace *work, const u
         }
     block->pair_count = (uint32_t)work->pair_count;
     block->bytes = block->pair_count * sizeof *block->pairs + block->run_count * sizeof *block->runs +
-                   steps * sizeof *block->deltas + codes * ALB_BLOCK;
+                   steps * (sizeof *block->deltas + sizeof *block->directions) + codes * ALB_BLOCK;
     if (!(block->pairs = malloc(block->bytes + 1)))
         return false;
     if (work->pair_count)
@@ -416,24 +442,41 @@ static bool allocate_block(alb_link_block *block, const workspace *work, const u
     block->runs = (alb_link_run *)(block->pairs + block->pair_count);
     block->deltas = (uint16_t *)(block->runs + block->run_count);
     block->codes = (uint8_t *)(block->deltas + steps);
+    block->directions = (int8_t(*)[4])(block->codes + codes * ALB_BLOCK);
     return true;
 }
 
-static void write_run(alb_link_run *run, uint16_t **deltas, uint8_t **codes, const workspace *work, uint32_t from,
-                      uint32_t to)
+// Where a run is written, or read.
+typedef struct cursor {
+    uint16_t *deltas;
+    uint8_t *codes;
+    int8_t (*directions)[4];
+} cursor;
+
+static void write_step(cursor *at, uint32_t delta, const link *next, const uint8_t *codes, size_t size)
+{
+    *at->deltas++ = (uint16_t)delta;
+    if (next) {
+        memcpy(at->codes, codes, size);
+        memcpy(*at->directions, next->direction, sizeof next->direction);
+    } else {
+        memset(at->codes, ALB_NO_LINK, size);
+        memset(*at->directions, 0, sizeof *at->directions);
+    }
+    at->codes += size;
+    at->directions++;
+}
+
+static void write_run(alb_link_run *run, cursor *at, const workspace *work, uint32_t from, uint32_t to)
 {
     const size_t size = (size_t)(ALB_BLOCK * alb_levels[run->level].parts);
     run->first = work->links[work->order[from]].node;
     uint32_t node = run->first;
     for (uint32_t k = from; k < to; k++) {
         const link *next = &work->links[work->order[k]];
-        for (; next->node - node > UINT16_MAX; node += UINT16_MAX, *codes += size) {
-            *(*deltas)++ = UINT16_MAX;
-            memset(*codes, ALB_NO_LINK, size);
-        }
-        *(*deltas)++ = (uint16_t)(next->node - node);
-        memcpy(*codes, work->codes + next->codes, size);
-        *codes += size;
+        for (; next->node - node > UINT16_MAX; node += UINT16_MAX)
+            write_step(at, UINT16_MAX, NULL, NULL, size);
+        write_step(at, next->node - node, next, work->codes + next->codes, size);
         node = next->node;
     }
 }
@@ -449,8 +492,7 @@ static void write_block(alb_link_block *block, const viewer *v, const uint16_t k
     work->failed = !allocate_block(block, work, starts);
     if (work->failed)
         return;
-    uint16_t *deltas = block->deltas;
-    uint8_t *codes = block->codes;
+    cursor at = {block->deltas, block->codes, block->directions};
     alb_link_run *run = block->runs;
     for (int bucket = 0; bucket < BUCKETS; bucket++) {
         const uint32_t from = starts[bucket], to = starts[bucket + 1];
@@ -460,9 +502,9 @@ static void write_block(alb_link_block *block, const viewer *v, const uint16_t k
                               .kernel = kernels[bucket / (OCTAVES * ALB_LEVELS)],
                               .octave = (uint8_t)(bucket / ALB_LEVELS % OCTAVES),
                               .level = (uint8_t)(bucket % ALB_LEVELS)};
-        write_run(run++, &deltas, &codes, v->work, from, to);
+        write_run(run++, &at, work, from, to);
     }
-    for (const uint8_t *code = block->codes; code < codes; code++)
+    for (const uint8_t *code = block->codes; code < at.codes; code++)
         block->link_count += *code != ALB_NO_LINK;
 }
 

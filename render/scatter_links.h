@@ -31,13 +31,14 @@ typedef struct alb_exact_pair {
     alb_rule rule;
 } alb_exact_pair;
 
-// One allocation holds the pairs, then the runs, the deltas and the codes.
+// One allocation holds the pairs, then the runs, the deltas, the codes and the directions.
 typedef struct alb_link_block {
     uint32_t first_leaf, row_count, run_count, pair_count;
     alb_exact_pair *pairs;
     alb_link_run *runs;
     uint16_t *deltas;
     uint8_t *codes;
+    int8_t (*directions)[4];  // from the block to the clusters, 127 long
     size_t bytes, link_count; // link_count: codes that are links, and pairs
 } alb_link_block;
 

@@ -1,7 +1,7 @@
 // The product: for each block of exit patches, for each link, eight look-ups times one cluster. In single precision
 // within a run of links, in double beyond it: rounding stays near 1e-7.
-//     out_j += sum over links (s(d) + v s''(d) / 2) node,   v the variance of the node
-// of a patch in n parts: node / n and the variance of a part.
+//     out_j += sum over links (s(d) + v s''(d) / 2) light + s'(d) u . moment
+// u the direction to the cluster, v its variance along it; of a patch in n parts light / n and the variance of a part.
 #include "render/scatter_product.h"
 #include "base/memory.h"
 #include "base/vector_clones.h"
@@ -10,52 +10,37 @@
 
 typedef float float8 __attribute__((vector_size(32)));
 
-// Colour and colour times variance.
-static inline void spread_node(float8 *both, const float node[4], float share, float spread)
+// Light and its moment along the direction, R, G, B and a zero each.
+static inline void take_node(float8 *light, const alb_scatter_node *node, const int8_t direction[4], float share)
 {
-    const float red = share * node[0], green = share * node[1], blue = share * node[2], v = spread * node[3];
-    *both = (float8){red, green, blue, 0, v * red, v * green, v * blue, 0};
+    typedef float float4 __attribute__((vector_size(16)));
+    float4 axes[3], along = {0};
+    memcpy(axes, node->moments, sizeof axes);
+    for (int k = 0; k < 3; k++)
+        along += (float)direction[k] * (1.0F / INT8_MAX) * axes[k];
+    *light = (float8){
+        share * node->light[0], share * node->light[1], share * node->light[2], 0, along[0], along[1], along[2], 0};
 }
 
+// rows += (table[code] + spread table[code] bent) light, for the rows of a block.
 ALB_VECTOR_CLONES
-static void add_whole(double sums[ALB_BLOCK][3], const float (*table)[8], const float (*nodes)[4],
-                      const uint16_t *deltas, const uint8_t *codes, size_t count)
+static void add_run(double sums[ALB_BLOCK][3], const float (*table)[16], const alb_scatter_node *node,
+                    const uint16_t *deltas, const uint8_t *codes, const int8_t (*directions)[4], size_t count,
+                    const alb_level *level)
 {
     float8 rows[ALB_BLOCK] = {{0}};
-    const float(*node)[4] = nodes;
-    for (size_t k = 0; k < count; k++, codes += ALB_BLOCK) {
-        float8 both, weights;
-        node += deltas[k];
-        spread_node(&both, *node, 1, 1);
-#pragma GCC unroll 8
-        for (int row = 0; row < ALB_BLOCK; row++) {
-            memcpy(&weights, table[codes[row]], sizeof weights);
-            rows[row] += weights * both;
-        }
-    }
-    for (int row = 0; row < ALB_BLOCK; row++)
-        for (int c = 0; c < 3; c++)
-            sums[row][c] += (double)(rows[row][c] + rows[row][4 + c]);
-}
-
-ALB_VECTOR_CLONES
-static void add_parted(double sums[ALB_BLOCK][3], const float (*table)[8], const float (*nodes)[4],
-                       const uint16_t *deltas, const uint8_t *codes, size_t count, const alb_level *level)
-{
-    float8 rows[ALB_BLOCK] = {{0}};
-    const float(*node)[4] = nodes;
     for (size_t k = 0; k < count; k++) {
-        float8 both, weights, all[ALB_BLOCK] = {{0}};
+        float8 light, value, bend;
         node += deltas[k];
-        spread_node(&both, *node, 1 / (float)level->parts, level->spread);
+        take_node(&light, node, directions[k], 1 / (float)level->parts);
+        const float v = level->spread * node->spread_mm2 * (float)directions[k][3] / 64;
         for (int part = 0; part < level->parts; part++, codes += ALB_BLOCK)
 #pragma GCC unroll 8
             for (int row = 0; row < ALB_BLOCK; row++) {
-                memcpy(&weights, table[codes[row]], sizeof weights);
-                all[row] += weights;
+                memcpy(&value, table[codes[row]], sizeof value);
+                memcpy(&bend, table[codes[row]] + 8, sizeof bend);
+                rows[row] += (value + v * bend) * light;
             }
-        for (int row = 0; row < ALB_BLOCK; row++)
-            rows[row] += all[row] * both;
     }
     for (int row = 0; row < ALB_BLOCK; row++)
         for (int c = 0; c < 3; c++)
@@ -66,17 +51,25 @@ static void add_parted(double sums[ALB_BLOCK][3], const float (*table)[8], const
 typedef struct cursor {
     const uint16_t *deltas;
     const uint8_t *codes;
+    const int8_t (*directions)[4];
 } cursor;
+
+static cursor begin(const alb_link_block *block)
+{
+    return (cursor){block->deltas, block->codes, (const int8_t(*)[4])block->directions};
+}
 
 static void step(cursor *at, const alb_link_run *run)
 {
     at->deltas += run->count;
+    at->directions += run->count;
     at->codes += (size_t)run->count * (size_t)(ALB_BLOCK * alb_levels[run->level].parts);
 }
 
-static const float (*table_of(const alb_scatter_kernel *kernels, const alb_link_run *run))[8]
+static const float (*table_of(const alb_scatter_kernel *kernels, const alb_link_run *run))[16]
 {
-    return (const float(*)[8])kernels[run->kernel].values + (size_t)run->octave * ALB_CODES;
+    return (const float(*)[16])kernels[run->kernel].values +
+           (size_t)(run->octave - kernels[run->kernel].first_used) * ALB_CODES;
 }
 
 static void add_pairs(double sums[ALB_BLOCK][3], const alb_link_block *block, const alb_forest *forest,
@@ -84,7 +77,7 @@ static void add_pairs(double sums[ALB_BLOCK][3], const alb_link_block *block, co
 {
     for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++)
         for (int c = 0; c < 3 && sides & 1U << kernels[pair->kernel].side; c++)
-            sums[pair->row][c] += (double)(pair->weights[c] * forest->nodes[pair->node][c]);
+            sums[pair->row][c] += (double)(pair->weights[c] * forest->nodes[pair->node].light[c]);
 }
 
 void alb_product_write_pairs(const alb_links *links, const alb_scatter_kernel *kernels)
@@ -107,16 +100,11 @@ void alb_product_add(double (*out)[3], const alb_links *links, const alb_forest 
     for (size_t b = 0; b < links->block_count; b++) {
         const alb_link_block *block = &links->blocks[b];
         double sums[ALB_BLOCK][3] = {{0}};
-        cursor at = {block->deltas, block->codes};
+        cursor at = begin(block);
         for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; step(&at, run++)) {
-            const float(*nodes)[4] = (const float(*)[4])forest->nodes + run->first;
-            if (!(sides & 1U << kernels[run->kernel].side))
-                continue;
-            if (run->level)
-                add_parted(sums, table_of(kernels, run), nodes, at.deltas, at.codes, run->count,
-                           &alb_levels[run->level]);
-            else
-                add_whole(sums, table_of(kernels, run), nodes, at.deltas, at.codes, run->count);
+            if (sides & 1U << kernels[run->kernel].side)
+                add_run(sums, table_of(kernels, run), forest->nodes + run->first, at.deltas, at.codes, at.directions,
+                        run->count, &alb_levels[run->level]);
         }
         add_pairs(sums, block, forest, kernels, sides);
         for (uint32_t row = 0; row < block->row_count; row++)
@@ -125,71 +113,84 @@ void alb_product_add(double (*out)[3], const alb_links *links, const alb_forest 
     }
 }
 
-// The transposed product: what the rows' areas send to the nodes.
-static void add_block_columns(float (*nodes)[4], const alb_link_block *block, const alb_forest *forest,
+// The transposed product: what the rows' areas send to each cluster, at its centre and how it changes from there.
+typedef struct column {
+    float value[3], change[3][3]; // change along x, y, z
+} column;
+
+static void add_block_columns(column *columns, const alb_link_block *block, const alb_forest *forest,
                               const alb_scatter_kernel *kernels)
 {
     const float *areas = forest->areas_mm2 + block->first_leaf;
     for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++)
         for (int c = 0; c < 3; c++)
-            nodes[pair->node][c] += areas[pair->row] * pair->weights[c];
-    cursor at = {block->deltas, block->codes};
+            columns[pair->node].value[c] += areas[pair->row] * pair->weights[c];
+    cursor at = begin(block);
     for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; step(&at, run++)) {
-        const float(*table)[8] = table_of(kernels, run);
+        const float(*table)[16] = table_of(kernels, run);
         const uint8_t *codes = at.codes;
         const alb_level *level = &alb_levels[run->level];
         size_t node = run->first;
         for (uint32_t k = 0; k < run->count; k++) {
-            float8 sum = {0}, weights;
+            float8 sum = {0}, value, bend;
             node += at.deltas[k];
+            const float v = level->spread * forest->nodes[node].spread_mm2 * (float)at.directions[k][3] / 64;
             for (int part = 0; part < level->parts; part++, codes += ALB_BLOCK)
                 for (uint32_t row = 0; row < block->row_count; row++) {
-                    memcpy(&weights, table[codes[row]], sizeof weights);
-                    sum += weights * areas[row];
+                    memcpy(&value, table[codes[row]], sizeof value);
+                    memcpy(&bend, table[codes[row]] + 8, sizeof bend);
+                    sum += (value + v * bend) * areas[row];
                 }
-            const float v = forest->nodes[node][3] * level->spread;
-            for (int c = 0; c < 3; c++)
-                nodes[node][c] += (sum[c] + v * sum[4 + c]) / (float)level->parts;
+            for (int c = 0; c < 3; c++) {
+                columns[node].value[c] += sum[c] / (float)level->parts;
+                for (int axis = 0; axis < 3; axis++)
+                    columns[node].change[axis][c] += sum[4 + c] * (float)at.directions[k][axis] / INT8_MAX;
+            }
         }
     }
 }
 
 // What a cluster got, its patches have each.
-static void hand_down(double (*sums)[3], const float (*nodes)[4], const alb_forest *forest, uint32_t node,
-                      uint32_t first_leaf, uint32_t count, const double above[3])
+static void hand_down(double (*sums)[3], const column *columns, const alb_forest *forest, uint32_t node,
+                      uint32_t first_leaf, uint32_t count, const column *above, uint32_t parent)
 {
-    double here[3];
-    for (int c = 0; c < 3; c++)
-        here[c] = above[c] + (double)nodes[node][c];
-    if (count == 1) {
-        for (int c = 0; c < 3; c++)
-            sums[forest->patches[first_leaf]][c] += here[c];
-        return;
+    column here = *above;
+    for (int c = 0; c < 3; c++) {
+        for (int axis = 0; axis < 3; axis++) {
+            here.value[c] += above->change[axis][c] *
+                             (forest->nodes[node].moments[axis][3] - forest->nodes[parent].moments[axis][3]);
+            here.change[axis][c] += columns[node].change[axis][c];
+        }
+        here.value[c] += columns[node].value[c];
+        if (count == 1)
+            sums[forest->patches[first_leaf]][c] += (double)here.value[c];
     }
+    if (count == 1)
+        return;
     const uint32_t left = alb_left_count(count);
-    hand_down(sums, nodes, forest, node + 1, first_leaf, left, here);
-    hand_down(sums, nodes, forest, node + 2 * left, first_leaf + left, count - left, here);
+    hand_down(sums, columns, forest, node + 1, first_leaf, left, &here, node);
+    hand_down(sums, columns, forest, node + 2 * left, first_leaf + left, count - left, &here, node);
 }
 
 bool alb_product_add_columns(double (*sums)[3], const alb_links *links, const alb_forest *forest,
                              const alb_scatter_kernel *kernels, alb_error *error)
 {
-    enum { SHARES = 4 }; // as many sums however many threads: the same bytes
-    static const double nothing[3] = {0};
-    float(*nodes)[4] = alb_allocate(SHARES * forest->node_count, sizeof *nodes, error);
-    if (!nodes)
+    enum { SHARES = 2 }; // as many sums however many threads: the same bytes
+    static const column nothing = {{0}, {{0}}};
+    column *columns = alb_allocate(SHARES * forest->node_count, sizeof *columns, error);
+    if (!columns)
         return false;
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t share = 0; share < SHARES; share++)
         for (size_t b = links->block_count * share / SHARES; b < links->block_count * (share + 1) / SHARES; b++)
-            add_block_columns(nodes + share * forest->node_count, &links->blocks[b], forest, kernels);
+            add_block_columns(columns + share * forest->node_count, &links->blocks[b], forest, kernels);
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t t = 0; t < forest->tree_count; t++) {
         const alb_tree *tree = &forest->trees[t];
         for (size_t share = 0; share < SHARES; share++)
-            hand_down(sums, (const float(*)[4])nodes + share * forest->node_count, forest, tree->first_node,
-                      tree->first_leaf, tree->leaf_count, nothing);
+            hand_down(sums, columns + share * forest->node_count, forest, tree->first_node, tree->first_leaf,
+                      tree->leaf_count, &nothing, tree->first_node);
     }
-    free(nodes);
+    free(columns);
     return true;
 }

@@ -4,7 +4,7 @@
 //     P(r) = integral_0^r s(r) r dr
 // Along an edge, at t from the perpendicular, t = |d| sinh w: rho = |d| cosh w, dtheta = dw / cosh w. In w the profile
 // turns over within a step of about one, however narrow it is, and Gauss-Legendre with five points an edge does: 1e-4
-// of the row's sum for well-shaped triangles, 3e-3 where w goes to 5 (aspect 100). The weights of an
+// of the row's sum for well-shaped triangles, 1.5e-2 at worst where w goes to 5 (aspect 100). The weights of an
 // edge are scaled to the angle that it spans, so that of a profile that ends inside the patch nothing is lost.
 //
 // Nothing of this depends on the profile: distances and weights stay, a change of profile is table look-ups.

@@ -100,21 +100,25 @@ static double exact_pair(const world *w, const alb_profile *profile, size_t exit
     return exact_triangle(profile, triangle, w->patches.centroids[exit]);
 }
 
-// The self-term against the oracle, on triangles up to an aspect of 100.
+// The self-term against the oracle: what five points an edge promise, of the row's sum, for triangles of aspect 3 and
+// of up to 100.
 static void self_term_is_exact(void **state)
 {
     (void)state;
-    const alb_box box = {.size_mm = {60, 60, 40}, .cells = {16, 16, 8}, .grading = 100};
+    static const double gradings[2] = {1, 100}, tolerances[2] = {2e-4, 0.015};
     const alb_surface stone = {.name = "marble", .scatters = true, .profiles = {{marble, one, two}}};
-    world w;
-    world_of_box(&w, &box, &stone);
-    for (size_t p = 0; p < w.patches.count; p++)
-        for (int c = 0; c < 3; c++) {
-            const alb_profile *profile = &stone.profiles[0][c];
-            // of the row's sum: what five points an edge promise for long triangles
-            check_near(w.scatter.local[p][c], exact_pair(&w, profile, p, p), 3e-3 * alb_profile_total(profile));
-        }
-    world_free(&w);
+    for (int k = 0; k < 2; k++) {
+        const alb_box box = {.size_mm = {60, 60, 40}, .cells = {16, 16, 8}, .grading = gradings[k]};
+        world w;
+        world_of_box(&w, &box, &stone);
+        for (size_t p = 0; p < w.patches.count; p++)
+            for (int c = 0; c < 3; c++) {
+                const alb_profile *profile = &stone.profiles[0][c];
+                check_near(w.scatter.local[p][c], exact_pair(&w, profile, p, p),
+                           tolerances[k] * alb_profile_total(profile));
+            }
+        world_free(&w);
+    }
 }
 
 // Root mean squares over sampled rows of the error of S' light, relative to the exact integrals.
@@ -306,7 +310,8 @@ static void wider_than_stored_reach(void **state)
         world_of_sphere(&found, 25, 4, &wax);
         world_of_sphere(&fresh, 25, 4, &other);
         check_ok(alb_scatter_rewrite(&found.scatter, &other, &error), &error);
-        check_below(rows_apart(&found, &fresh), times < 0 ? 0.0075 : 0.03); // as wide: each half a percent; narrower: more
+        check_below(rows_apart(&found, &fresh),
+                    times < 0 ? 0.0075 : 0.03); // as wide: each half a percent; narrower: more
         check_ok(alb_scatter_rewrite(&found.scatter, &wax, &error), &error);
         world again;
         world_of_sphere(&again, 25, 4, &wax);
@@ -468,19 +473,19 @@ static void faces_of_a_slab_are_told_apart(void **state)
     light[lit][0] = 1 / w.patches.areas_mm2[lit]; // flux 1
     alb_scatter_apply(out, &w.scatter, (const double(*)[3])light);
     alb_scatter_apply_across(across, &w.scatter, (const double(*)[3])light);
-    double found[ALB_SIDES][6] = {{0}}, expected[ALB_SIDES][6] = {{0}}; // rings of 3 mm, the last to 18 mm
+    double found[ALB_SIDES][4] = {{0}}, expected[ALB_SIDES][4] = {{0}}; // rings of 3 mm
     for (size_t p = 0; p < n; p++) {
         const alb_vector to = alb_sub(w.patches.centroids[p], w.patches.centroids[lit]);
         const double lateral = hypot(to.x, to.y);
         const alb_side side = w.patches.normals[p].z < -0.9 ? ALB_TRANSMISSION : ALB_REFLECTION;
-        if (fabs(w.patches.normals[p].z) < 0.9 || lateral >= 18)
+        if (fabs(w.patches.normals[p].z) < 0.9 || lateral >= 12)
             continue;
         found[side][(int)(lateral / 3)] += w.patches.areas_mm2[p] * out[p][0];
         expected[side][(int)(lateral / 3)] += w.patches.areas_mm2[p] * ring_value(&w, &wax.profiles[side][0], p, lit);
         check_near(across[p][0], side == ALB_TRANSMISSION ? out[p][0] : 0, 0);
     }
     for (int side = 0; side < ALB_SIDES; side++)
-        for (int ring = 0; ring < 6; ring++) // one patch stands in a cluster: its centre is not its own: rings smear
+        for (int ring = 0; ring < 4; ring++) // one patch in a cluster, to second order of its place there
             check_relative(found[side][ring], expected[side][ring], 0.08);
     free(light);
     free(out);
