@@ -1,0 +1,76 @@
+// Paths through the volume of one body: what the parts of it share. Points are relative to the body's middle.
+#pragma once
+#include "render/optical_path.h"
+#include "render/voxels.h"
+
+enum { ALB_BENDS_MAX = 128, ALB_NO_FACE = -1 };
+
+// The triangles of a body and how they join.
+typedef struct alb_surface_net {
+    size_t count;
+    alb_vector (*triangles)[3], *normals, *middles; // relative to `origin`
+    uint32_t (*neighbours)[3]; // across edge k -> k + 1: 3 * triangle + edge there; UINT32_MAX: none, or more than one
+    uint32_t *local, first, last; // local[patch - first]: triangle
+    alb_vector origin;
+    double edge_mm; // median of the longest edges
+} alb_surface_net;
+
+bool alb_surface_net_create(alb_surface_net *net, const alb_body *body, const alb_patches *patches, alb_error *error);
+void alb_surface_net_free(alb_surface_net *net);
+
+// Corners of a path, ends included, and its length.
+typedef struct alb_bends {
+    int count;
+    alb_vector at[ALB_BENDS_MAX];
+    double length_mm;
+} alb_bends;
+
+// A place where paths may turn: a piece of surface in one voxel that faces one way, or the middle of a voxel inside.
+typedef struct alb_turns {
+    double size_mm;
+    int n[3];
+    alb_vector low;
+    size_t count, surface_count; // the pieces of surface come first
+    float (*at)[3];
+    uint32_t *voxel_starts, *voxel_nodes; // nodes of each voxel
+    uint32_t *adjacent_starts, *adjacent; // of surface pieces: those joined to it along edges
+    uint32_t *of_triangle;
+} alb_turns;
+
+typedef struct alb_optical_solid {
+    alb_surface_net net;
+    alb_voxels voxels;
+    alb_vector *starts; // of each triangle: its middle, a little way in
+    double lift_mm;     // by how much corners of paths are kept off the surface
+    alb_turns turns;
+    double reach_mm;
+} alb_optical_solid;
+
+bool alb_turns_create(alb_turns *turns, const alb_optical_solid *solid, double size_mm, alb_error *error);
+void alb_turns_free(alb_turns *turns);
+
+// The search from one node: length and parent of every node within reach.
+typedef struct alb_search {
+    uint32_t source, *parents, *stamps, stamp;
+    float *lengths;
+    unsigned char *states;
+    struct alb_heap_entry *heap;
+    size_t heap_count, heap_capacity, searches;
+} alb_search;
+bool alb_search_create(alb_search *search, size_t nodes, alb_error *error);
+void alb_search_free(alb_search *search);
+void alb_search_run(alb_search *search, const alb_optical_solid *solid, uint32_t source);
+
+// The shortest path from one point to another in the half plane through both that `towards` points into, along the
+// surface where the chord leaves the body. False where the surface does not lead back to the chord, or leads through
+// another part of the outside.
+bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to, alb_vector towards);
+// Which half plane the surface where the chord leaves and returns speaks for; false where it does not.
+bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, alb_vector from, alb_vector to);
+
+bool alb_optical_solid_create(alb_optical_solid *solid, const alb_body *body, const alb_patches *patches,
+                              double voxel_mm, double reach_mm, alb_error *error);
+void alb_optical_solid_free(alb_optical_solid *solid);
+// From triangle to triangle; the last leg ends at `point`.
+double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *solid, uint32_t from, uint32_t to,
+                                 alb_vector point);
