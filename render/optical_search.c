@@ -186,6 +186,8 @@ static bool find_parent(alb_search *s, const alb_optical_solid *solid, uint32_t 
     return true;
 }
 
+bool alb_search_found(const alb_search *search, uint32_t node) { return state_of(search, node) & CLOSED; }
+
 static void relax(alb_search *s, const alb_optical_solid *solid, uint32_t node)
 {
     const uint32_t parent = s->parents[node];

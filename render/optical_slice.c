@@ -9,6 +9,8 @@
 // to where both sides meet the edge at one angle. What remains is second order in the angle between the plane and the
 // true path.
 #include "render/optical_solid.h"
+#include <stdio.h>
+#include <stdlib.h>
 
 enum { CROSSINGS = 48, POINTS = 1024, SWEEPS = 4 };
 
@@ -143,12 +145,35 @@ static bool legs_are_inside(const alb_bends *bends, const cut *hull, int kept, c
     for (int i = 0; i <= kept; i++) {
         if (i > 0 && i < kept && hull[i].order - hull[i - 1].order == 1)
             continue;
-        if (!alb_voxels_inside(&solid->voxels, bends->at[i], bends->at[i + 1]))
-            return false;
+        if (!alb_voxels_inside(&solid->voxels, bends->at[i], bends->at[i + 1])) {
+            if(getenv("TRACE")) printf("  leg %d of %d blocked\n", i, kept);
+            return false;}
     }
     return true;
 }
 
+// The mean normal of the triangles on both sides of the edge that is cut.
+static alb_vector normal_at(const cut *c, const alb_surface_net *net)
+{
+    for (int k = 0; k < 3; k++) {
+        const alb_vector a = net->triangles[c->triangle][k];
+        const uint32_t across = net->neighbours[c->triangle][k];
+        if (a.x == c->a.x && a.y == c->a.y && a.z == c->a.z && across != UINT32_MAX)
+            return alb_unit(alb_add(net->normals[c->triangle], net->normals[across / 3]));
+    }
+    return net->normals[c->triangle];
+}
+
+// Measures the corners as they are, then moves them off the surface; false where a leg leaves the body.
+static bool finish(alb_bends *bends, const cut *hull, int kept, const alb_optical_solid *solid)
+{
+    bends->length_mm = length_of(bends);
+    for (int i = 0; i < kept; i++)
+        bends->at[i + 1] = alb_sub(bends->at[i + 1], alb_times(solid->lift_mm, normal_at(&hull[i], &solid->net)));
+    return legs_are_inside(bends, hull, kept, solid);
+}
+
+// The path over the hull's corners, moved along their edges if that stays inside.
 static bool string(alb_bends *bends, const cut *hull, int kept, const alb_optical_solid *solid, alb_vector from,
                    alb_vector to, const plane *p)
 {
@@ -158,22 +183,15 @@ static bool string(alb_bends *bends, const cut *hull, int kept, const alb_optica
     bends->at[0] = from, bends->at[kept + 1] = to;
     for (int i = 0; i < kept; i++)
         bends->at[i + 1] = alb_add(p->origin, alb_add(alb_times(hull[i].x, p->along), alb_times(hull[i].y, p->up)));
+    alb_bends moved = *bends;
     for (int sweep = 0; sweep < SWEEPS; sweep++)
         for (int i = 0; i < kept; i++)
-            bends->at[i + 1] = on_edge(hull[i].a, hull[i].b, bends->at[i], bends->at[i + 2]);
-    bends->length_mm = length_of(bends);
-    for (int i = 0; i < kept; i++) { // off the surface, so that legs can be tested
-        const uint32_t t = hull[i].triangle;
-        alb_vector normal = solid->net.normals[t];
-        for (int k = 0; k < 3; k++) {
-            const alb_vector a = solid->net.triangles[t][k];
-            const uint32_t across = solid->net.neighbours[t][k];
-            if (a.x == hull[i].a.x && a.y == hull[i].a.y && a.z == hull[i].a.z && across != UINT32_MAX)
-                normal = alb_unit(alb_add(normal, solid->net.normals[across / 3]));
-        }
-        bends->at[i + 1] = alb_sub(bends->at[i + 1], alb_times(solid->lift_mm, normal));
+            moved.at[i + 1] = on_edge(hull[i].a, hull[i].b, moved.at[i], moved.at[i + 2]);
+    if (finish(&moved, hull, kept, solid)) {
+        *bends = moved;
+        return true;
     }
-    return legs_are_inside(bends, hull, kept, solid);
+    return finish(bends, hull, kept, solid);
 }
 
 bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to, alb_vector towards)
@@ -193,8 +211,9 @@ bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from
         if (!crossings[i].leaves)
             continue;
         const int back = follow(cuts, &cut_count, (int)i, &solid->net, &p, crossings, count, crossings[i].triangle);
-        if (back < 0)
-            return false;
+        if (back < 0) {
+            if(getenv("TRACE")) printf("  follow failed: crossing %zu of %zu cuts %d\n", i, count, cut_count);
+            return false;}
         if ((size_t)back > i)
             i = (size_t)back;
     }
@@ -212,5 +231,6 @@ bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, al
         alb_add(solid->net.normals[crossings[0].triangle], solid->net.normals[crossings[count - 1].triangle]);
     const alb_vector along = alb_unit(alb_sub(to, from));
     *towards = alb_sub(alb_times(alb_dot(sum, along), along), sum);
-    return alb_dot(*towards, *towards) > 0.01;
+    if(getenv("TRACE")) printf("  direction %g of %zu\n",alb_dot(*towards, *towards),count);
+    return alb_dot(*towards, *towards) > 1e-6;
 }

@@ -8,6 +8,7 @@
 #include "base/memory.h"
 #include <stdlib.h>
 #include <string.h>
+#include <stdio.h>
 
 // A section that is longer than this times its chord is compared with the graph's path.
 static const double trusted_detour = 1.2;
@@ -72,21 +73,41 @@ static bool shorten(alb_bends *path, const alb_optical_solid *solid)
     return fewer;
 }
 
-// Replaces corner i by the section through its neighbours and itself, where that is shorter.
-static int pull(alb_bends *path, const alb_optical_solid *solid, int i)
+static double between(const alb_bends *path, int first, int last)
+{
+    double length = 0;
+    for (int i = first; i < last; i++)
+        length += alb_length(alb_sub(path->at[i + 1], path->at[i]));
+    return length;
+}
+
+// Replaces what lies between two corners by the section through them and the mean of the corners, where
+// that is shorter.
+static void pull(alb_bends *path, const alb_optical_solid *solid, int first, int last)
 {
     alb_bends section;
-    const alb_vector before = path->at[i - 1], after = path->at[i + 1];
-    const double now = alb_length(alb_sub(path->at[i], before)) + alb_length(alb_sub(path->at[i], after));
-    if (!alb_slice(&section, solid, before, after, alb_sub(path->at[i], before)) || !(section.length_mm < now))
-        return 1;
-    const int more = section.count - 3; // corners beyond the one replaced
+    const alb_vector from = path->at[first], to = path->at[last], along = alb_unit(alb_sub(to, from));
+    alb_vector towards = {0};
+    for (int i = first + 1; i < last; i++) {
+        const alb_vector at = alb_sub(path->at[i], from);
+        towards = alb_add(towards, alb_sub(at, alb_times(alb_dot(at, along), along)));
+    }
+    if (!alb_slice(&section, solid, from, to, towards) || !(section.length_mm < between(path, first, last)))
+        return;
+    const int more = section.count - (last - first + 1); // corners
     if (path->count + more > ALB_BENDS_MAX)
-        return 1;
-    memmove(&path->at[i + 1 + more], &path->at[i + 1], (size_t)(path->count - i - 1) * sizeof *path->at);
-    memcpy(&path->at[i], &section.at[1], (size_t)(section.count - 2) * sizeof *path->at);
+        return;
+    memmove(&path->at[last + more], &path->at[last], (size_t)(path->count - last) * sizeof *path->at);
+    memcpy(&path->at[first + 1], &section.at[1], (size_t)(section.count - 2) * sizeof *path->at);
     path->count += more;
-    return section.count - 2 > 0 ? section.count - 2 : 0;
+}
+
+// All of it, then halves that overlap, then quarters, until corner by corner.
+static void tighten(alb_bends *path, const alb_optical_solid *solid)
+{
+    for (int span = path->count - 1; span > 1; span = span > 3 ? span / 2 : span - 1)
+        for (int first = 0; first + 2 < path->count; first += (span + 1) / 2)
+            pull(path, solid, first, first + span < path->count - 1 ? first + span : path->count - 1);
 }
 
 // Length; a leg that is blocked (within a piece of surface, or between joined ones) is measured along its section.
@@ -106,33 +127,55 @@ static double length_of(const alb_bends *path, const alb_optical_solid *solid)
     return length;
 }
 
-// The graph's path, pulled tight; *last is its last corner before the end. INFINITY where there is none.
-static double graph_path(alb_vector *last, alb_search *search, const alb_optical_solid *solid, uint32_t from,
-                         uint32_t to)
+// The graph's path: its corners, backwards, with the pieces of surface at both ends. False where there is none.
+static bool graph_path(alb_bends *path, alb_search *search, const alb_optical_solid *solid, uint32_t from, uint32_t to)
 {
     const alb_turns *turns = &solid->turns;
     const uint32_t source = turns->of_triangle[from], target = turns->of_triangle[to];
     if (search->source != source)
         alb_search_run(search, solid, source);
-    if (search->stamps[target] != search->stamp || !(search->states[target] & 4))
-        return (double)INFINITY;
-    alb_bends path = {.count = 0};
-    put(&path, solid->starts[to]);
+    if (!alb_search_found(search, target))
+        return false;
+    path->count = 0;
+    put(path, solid->starts[to]);
     for (uint32_t node = target;; node = search->parents[node]) {
-        put(&path, (alb_vector){(double)turns->at[node][0], (double)turns->at[node][1], (double)turns->at[node][2]});
-        if (node == source || path.count >= CHAIN)
+        put(path, (alb_vector){(double)turns->at[node][0], (double)turns->at[node][1], (double)turns->at[node][2]});
+        if (node == source || path->count >= CHAIN)
             break;
     }
-    put(&path, solid->starts[from]); // the path runs backwards
-    shorten(&path, solid);
+    put(path, solid->starts[from]);
+    return true;
+}
+
+// Pulls it tight and measures it; *last is its last corner before the end.
+static double pulled(alb_vector *last, alb_bends *path, const alb_optical_solid *solid)
+{
+    shorten(path, solid);
+    double length = length_of(path, solid);
     for (int round = 0; round < ROUNDS; round++) {
-        for (int i = 1; i + 1 < path.count;)
-            i += pull(&path, solid, i);
-        if (!shorten(&path, solid))
+        tighten(path, solid);
+        shorten(path, solid);
+        const double before = length;
+        length = fmin(length, length_of(path, solid));
+        if (length > (1 - 1e-4) * before)
             break;
     }
-    *last = path.at[1];
-    return length_of(&path, solid);
+    *last = path->at[1];
+    return length;
+}
+
+// Its length to first order: from end to end without the pieces of surface there.
+static double estimate(const alb_bends *path)
+{
+    double length = 0;
+    for (int i = 1; i < path->count; i++) {
+        const bool end = path->count > 4 && (i == 1 || i == path->count - 1);
+        if (!end && path->count > 4 && (i == 2 || i == path->count - 2))
+            length += alb_length(alb_sub(path->at[i == 2 ? 0 : i + 1], path->at[i == 2 ? 2 : i - 1]));
+        else if (!end)
+            length += alb_length(alb_sub(path->at[i], path->at[i - 1]));
+    }
+    return length;
 }
 
 double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *solid, uint32_t from, uint32_t to,
@@ -142,16 +185,16 @@ double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *so
     const double chord = alb_length(alb_sub(middle, solid->net.middles[from]));
     if (from == to || alb_voxels_inside(&solid->voxels, start, end))
         return alb_length(alb_sub(point, solid->net.middles[from]));
-    alb_bends section;
+    alb_bends path;
     alb_vector towards, last = start;
     double best = (double)INFINITY;
-    if (alb_slice_direction(&towards, solid, start, end) && alb_slice(&section, solid, start, end, towards)) {
-        best = section.length_mm;
-        last = section.at[section.count - 2];
+    if (alb_slice_direction(&towards, solid, start, end) && alb_slice(&path, solid, start, end, towards)) {
+        best = path.length_mm;
+        last = path.at[path.count - 2];
     }
-    if (best > trusted_detour * chord) {
+    if (best > trusted_detour * chord && graph_path(&path, search, solid, from, to) && estimate(&path) < 0.98 * best) {
         alb_vector corner = {0};
-        const double other = graph_path(&corner, search, solid, from, to);
+        const double other = pulled(&corner, &path, solid);
         if (other < best)
             best = other, last = corner;
     }

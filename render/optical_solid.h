@@ -59,6 +59,8 @@ typedef struct alb_search {
 } alb_search;
 bool alb_search_create(alb_search *search, size_t nodes, alb_error *error);
 void alb_search_free(alb_search *search);
+// Whether the last search got there.
+bool alb_search_found(const alb_search *search, uint32_t node);
 void alb_search_run(alb_search *search, const alb_optical_solid *solid, uint32_t source);
 
 // The shortest path from one point to another in the half plane through both that `towards` points into, along the
