@@ -9,8 +9,6 @@
 // to where both sides meet the edge at one angle. What remains is second order in the angle between the plane and the
 // true path.
 #include "render/optical_solid.h"
-#include <stdio.h>
-#include <stdlib.h>
 
 enum { CROSSINGS = 48, POINTS = 1024, SWEEPS = 4 };
 
@@ -145,9 +143,8 @@ static bool legs_are_inside(const alb_bends *bends, const cut *hull, int kept, c
     for (int i = 0; i <= kept; i++) {
         if (i > 0 && i < kept && hull[i].order - hull[i - 1].order == 1)
             continue;
-        if (!alb_voxels_inside(&solid->voxels, bends->at[i], bends->at[i + 1])) {
-            if(getenv("TRACE")) printf("  leg %d of %d blocked\n", i, kept);
-            return false;}
+        if (!alb_voxels_inside(&solid->voxels, bends->at[i], bends->at[i + 1]))
+            return false;
     }
     return true;
 }
@@ -211,9 +208,8 @@ bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from
         if (!crossings[i].leaves)
             continue;
         const int back = follow(cuts, &cut_count, (int)i, &solid->net, &p, crossings, count, crossings[i].triangle);
-        if (back < 0) {
-            if(getenv("TRACE")) printf("  follow failed: crossing %zu of %zu cuts %d\n", i, count, cut_count);
-            return false;}
+        if (back < 0)
+            return false;
         if ((size_t)back > i)
             i = (size_t)back;
     }
@@ -231,6 +227,5 @@ bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, al
         alb_add(solid->net.normals[crossings[0].triangle], solid->net.normals[crossings[count - 1].triangle]);
     const alb_vector along = alb_unit(alb_sub(to, from));
     *towards = alb_sub(alb_times(alb_dot(sum, along), along), sum);
-    if(getenv("TRACE")) printf("  direction %g of %zu\n",alb_dot(*towards, *towards),count);
     return alb_dot(*towards, *towards) > 1e-6;
 }

@@ -8,7 +8,6 @@
 #include "base/memory.h"
 #include <stdlib.h>
 #include <string.h>
-#include <stdio.h>
 
 // A section that is longer than this times its chord is compared with the graph's path.
 static const double trusted_detour = 1.2;

@@ -182,8 +182,11 @@ static inline bool make_ring(alb_mesh *mesh, double a, double r, double height, 
                            s = (uint32_t)((i + 1) % around * outline + j),
                            t = (uint32_t)((i + 1) % around * outline + (j + 1) % outline);
             const bool odd = (i + j) % 2;
-            if (!alb_mesh_add_face(mesh, p, odd ? s : t, q, 0, error) ||
-                !alb_mesh_add_face(mesh, odd ? s : p, s == p ? p : odd ? t : s, odd ? q : t, 0, error))
+            if (!alb_mesh_add_face(mesh, p, odd ? s : t, q, 0, error) || !alb_mesh_add_face(mesh, odd ? s : p,
+                                                                                            s == p ? p
+                                                                                            : odd  ? t
+                                                                                                   : s,
+                                                                                            odd ? q : t, 0, error))
                 return false;
         }
     return true;
