@@ -318,16 +318,20 @@ static void start(geodesic *g, size_t count, uint32_t triangle, alb_vector from)
         emit(g, triangle, k, from, 0);
 }
 
-// The furthest target so far: nothing beyond it is worth a look.
-static double furthest(const alb_geodesic_target *targets, size_t count)
+// The furthest group so far: nothing beyond it is worth a look.
+static double furthest(const alb_geodesic_target *targets, size_t count, size_t alternatives)
 {
     double most = 0;
-    for (size_t i = 0; i < count; i++)
-        most = fmax(most, targets[i].to_at_mm);
+    for (size_t i = 0; i < count; i += alternatives) {
+        double nearest = (double)INFINITY;
+        for (size_t k = 0; k < alternatives; k++)
+            nearest = fmin(nearest, targets[i + k].to_at_mm);
+        most = fmax(most, nearest);
+    }
     return most;
 }
 
-void alb_geodesic_run(alb_geodesic_target *targets, size_t count, alb_geodesic_memory *memory,
+void alb_geodesic_run(alb_geodesic_target *targets, size_t count, size_t alternatives, alb_geodesic_memory *memory,
                       const alb_geodesic_surface *surface, uint32_t triangle, alb_vector from, double reach_mm)
 {
     geodesic g = {targets, memory, surface, reach_mm};
@@ -336,7 +340,7 @@ void alb_geodesic_run(alb_geodesic_target *targets, size_t count, alb_geodesic_m
     for (size_t step = 0; memory->heap_count > 0; step++) {
         const window_key key = pop(memory);
         if (step % LOOK_AGAIN == 0)
-            limit = fmin(reach_mm, furthest(targets, count));
+            limit = fmin(reach_mm, furthest(targets, count, alternatives));
         if (key.distance > limit)
             break;
         if (key.id >= WINDOWS) {

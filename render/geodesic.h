@@ -42,5 +42,7 @@ typedef struct alb_geodesic_memory {
 bool alb_geodesic_memory_create(alb_geodesic_memory *memory, const alb_geodesic_surface *surface, alb_error *error);
 void alb_geodesic_memory_free(alb_geodesic_memory *memory);
 
-void alb_geodesic_run(alb_geodesic_target *targets, size_t count, alb_geodesic_memory *memory,
+// The targets stand in groups of `alternatives` (1: each for itself), count is a multiple of it; of a group only the
+// nearest is sure to be shortest, the others are at least so far. dropped tells windows there was no room for.
+void alb_geodesic_run(alb_geodesic_target *targets, size_t count, size_t alternatives, alb_geodesic_memory *memory,
                       const alb_geodesic_surface *surface, uint32_t triangle, alb_vector from, double reach_mm);

@@ -25,7 +25,6 @@ typedef struct alb_optical_paths {
     double voxel_mm;       // of the path graph; 0 where there is none
     double thickness_mm;   // median distance to the opposing face, along the normal inwards; 0 if not measured
     size_t bytes;          // all that is kept
-    size_t searches;       // of the graph or of the faces, since the paths were created
     size_t unsure_voxels;  // whose winding number is far from a whole number: the surface has holes there
     char description[256]; // one sentence: which kind, why, how fine; for the log
     const alb_patches *patches;

@@ -30,18 +30,24 @@ static bool fill_starts(alb_optical_solid *solid, alb_error *error)
 }
 
 bool alb_optical_solid_create(alb_optical_solid *solid, const alb_body *body, const alb_patches *patches,
-                              double voxel_mm, double reach_mm, alb_error *error)
+                              alb_error *error)
 {
-    *solid = (alb_optical_solid){.reach_mm = reach_mm};
+    *solid = (alb_optical_solid){0};
     if (!alb_surface_net_create(&solid->net, body, patches, error))
         return false;
     solid->lift_mm = 1e-4 * solid->net.edge_mm;
     if (alb_voxels_create(&solid->voxels, (const alb_vector(*)[3])solid->net.triangles, solid->net.count,
                           0.8 * solid->net.edge_mm, FINE_VOXELS, body->closed, error) &&
-        fill_starts(solid, error) && alb_turns_create(&solid->turns, solid, voxel_mm, error))
+        fill_starts(solid, error))
         return true;
     alb_optical_solid_free(solid);
     return false;
+}
+
+bool alb_optical_solid_prepare(alb_optical_solid *solid, double voxel_mm, double reach_mm, alb_error *error)
+{
+    solid->reach_mm = reach_mm;
+    return alb_turns_create(&solid->turns, solid, voxel_mm, error);
 }
 
 void alb_optical_solid_free(alb_optical_solid *solid)

@@ -1,5 +1,6 @@
-// Paths through the volume of one body: what the parts of it share. Points are relative to the body's middle.
+// Paths inside one body: what the parts that find them share. Points are relative to the body's middle.
 #pragma once
+#include "render/geodesic.h"
 #include "render/optical_path.h"
 #include "render/voxels.h"
 
@@ -70,9 +71,40 @@ bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from
 // Which half plane the surface where the chord leaves and returns speaks for; false where it does not.
 bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, alb_vector from, alb_vector to);
 
+// The net, the voxels and the starts.
 bool alb_optical_solid_create(alb_optical_solid *solid, const alb_body *body, const alb_patches *patches,
-                              double voxel_mm, double reach_mm, alb_error *error);
+                              alb_error *error);
+// The graph, from voxels of voxel_mm; what alb_optical_solid_measure needs besides.
+bool alb_optical_solid_prepare(alb_optical_solid *solid, double voxel_mm, double reach_mm, alb_error *error);
 void alb_optical_solid_free(alb_optical_solid *solid);
 // From triangle to triangle; the last leg ends at `point`.
 double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *solid, uint32_t from, uint32_t to,
                                  alb_vector point);
+
+// A sheet: the faces of a body and what lies opposite.
+typedef struct alb_optical_sheet {
+    uint32_t *facing;  // of each triangle: that which faces it across the sheet; UINT32_MAX: none
+    alb_vector *feet;  // where the normal inwards meets that
+    double *thickness; // how far off; INFINITY: none
+    double median_mm;  // by area
+    alb_geodesic_surface surface;
+} alb_optical_sheet;
+
+// Measures the thickness: facing, feet and thickness, up to longest_mm.
+bool alb_optical_sheet_create(alb_optical_sheet *sheet, const alb_optical_solid *solid, double longest_mm,
+                              alb_error *error);
+void alb_optical_sheet_free(alb_optical_sheet *sheet);
+// Share of the area whose opposing face is nearer than limit_mm.
+double alb_optical_sheet_share(const alb_optical_sheet *sheet, const alb_surface_net *net, double limit_mm);
+// What alb_optical_sheet_measure needs besides.
+bool alb_optical_sheet_prepare(alb_optical_sheet *sheet, const alb_surface_net *net, alb_error *error);
+
+enum { ALB_SHEET_TARGETS = 1024 };
+typedef struct alb_sheet_memory {
+    alb_geodesic_memory geodesic;
+    alb_geodesic_target targets[2 * ALB_SHEET_TARGETS];
+} alb_sheet_memory;
+// From a triangle to at most ALB_SHEET_TARGETS others; points[k] is the end of path k, relative to the net's origin.
+void alb_optical_sheet_measure(float *distances_mm, unsigned char *opposite, alb_sheet_memory *memory,
+                               const alb_optical_sheet *sheet, const alb_surface_net *net, uint32_t from,
+                               const uint32_t *to, const alb_vector *points, size_t count, double reach_mm);

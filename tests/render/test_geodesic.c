@@ -45,7 +45,7 @@ static alb_geodesic_target *to_all(skin *s, uint32_t from, double reach_mm)
     alb_geodesic_target *targets = calloc(s->net.count, sizeof *targets);
     for (uint32_t i = 0; i < s->net.count; i++)
         targets[i] = (alb_geodesic_target){.triangle = i, .at = s->net.middles[i], .end = s->net.middles[i]};
-    alb_geodesic_run(targets, s->net.count, &s->memory, &s->surface, from, s->net.middles[from], reach_mm);
+    alb_geodesic_run(targets, s->net.count, 1, &s->memory, &s->surface, from, s->net.middles[from], reach_mm);
     assert_int_equal(s->memory.dropped, 0);
     return targets;
 }
