@@ -11,6 +11,7 @@
 #include "render/optical_solid.h"
 
 enum { CROSSINGS = 48, POINTS = 1024, SWEEPS = 4 };
+static const double worth_turning = 1.05; // detour beyond which other planes are tried
 
 typedef struct plane {
     alb_vector origin, along, up, normal; // along the chord; up: the side of the path
@@ -215,6 +216,46 @@ bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from
     }
     const int kept = tighten(cuts, cut_count, length);
     return string(bends, cuts, kept, solid, from, to, &p);
+}
+
+static alb_vector turned(alb_vector up, alb_vector along, double angle)
+{
+    return alb_add(alb_times(cos(angle), up), alb_times(sin(angle), alb_cross(along, up)));
+}
+
+// Three planes, then where a parabola through their lengths is lowest; then the same closer by.
+bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to,
+                    alb_vector towards)
+{
+    const alb_vector chord = alb_sub(to, from), along = alb_unit(chord);
+    alb_vector up = alb_unit(alb_sub(towards, alb_times(alb_dot(towards, along), along)));
+    if (!alb_slice(bends, solid, from, to, up))
+        return false;
+    double step = 0.3;
+    for (int round = 0; round < 3 && bends->length_mm > worth_turning * alb_length(chord); round++, step /= 3) {
+        alb_bends other[2];
+        double length[2];
+        for (int k = 0; k < 2; k++) {
+            const bool ok = alb_slice(&other[k], solid, from, to, turned(up, along, k ? step : -step));
+            length[k] = ok ? other[k].length_mm : 2 * bends->length_mm;
+        }
+        const double bend = length[0] + length[1] - 2 * bends->length_mm;
+        double angle = bend > 0 ? 0.5 * step * (length[0] - length[1]) / bend : 0;
+        angle = fmin(fmax(angle, -2 * step), 2 * step);
+        alb_bends lowest;
+        const bool ok = alb_slice(&lowest, solid, from, to, turned(up, along, angle));
+        const double before = bends->length_mm;
+        alb_vector best = up;
+        for (int k = 0; k < 2; k++)
+            if (length[k] < bends->length_mm)
+                *bends = other[k], best = turned(up, along, k ? step : -step);
+        if (ok && lowest.length_mm < bends->length_mm)
+            *bends = lowest, best = turned(up, along, angle);
+        up = best;
+        if (bends->length_mm > (1 - 1e-3) * before)
+            break;
+    }
+    return true;
 }
 
 bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, alb_vector from, alb_vector to)

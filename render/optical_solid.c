@@ -86,9 +86,9 @@ static double between(const alb_bends *path, int first, int last)
     return length;
 }
 
-// Replaces what lies between two corners by the section through them and the mean of the corners, where
-// that is shorter.
-static void pull(alb_bends *path, const alb_optical_solid *solid, int first, int last)
+// Replaces what lies between two corners by the section through them and the mean of the corners, or the best one
+// turned from it, where that is shorter.
+static bool pull(alb_bends *path, const alb_optical_solid *solid, int first, int last, bool turn)
 {
     alb_bends section;
     const alb_vector from = path->at[first], to = path->at[last], along = alb_unit(alb_sub(to, from));
@@ -97,22 +97,30 @@ static void pull(alb_bends *path, const alb_optical_solid *solid, int first, int
         const alb_vector at = alb_sub(path->at[i], from);
         towards = alb_add(towards, alb_sub(at, alb_times(alb_dot(at, along), along)));
     }
-    if (!alb_slice(&section, solid, from, to, towards) || !(section.length_mm < between(path, first, last)))
-        return;
+    if (!(turn ? alb_slice_best : alb_slice)(&section, solid, from, to, towards) ||
+        !(section.length_mm < between(path, first, last)))
+        return false;
     const int more = section.count - (last - first + 1); // corners
     if (path->count + more > ALB_BENDS_MAX)
-        return;
+        return false;
     memmove(&path->at[last + more], &path->at[last], (size_t)(path->count - last) * sizeof *path->at);
     memcpy(&path->at[first + 1], &section.at[1], (size_t)(section.count - 2) * sizeof *path->at);
     path->count += more;
+    return true;
 }
 
-// All of it, then halves that overlap, then quarters, until corner by corner.
+// All of it, then halves that overlap, then quarters, until corner by corner; less where the whole could be replaced
+// and parts gain nothing.
 static void tighten(alb_bends *path, const alb_optical_solid *solid)
 {
-    for (int span = path->count - 1; span > 1; span = span > 3 ? span / 2 : span - 1)
+    const bool whole = pull(path, solid, 0, path->count - 1, true);
+    for (int span = path->count / 2; span > 1; span = span > 3 ? span / 2 : span - 1) {
+        const double before = between(path, 0, path->count - 1);
         for (int first = 0; first + 2 < path->count; first += (span + 1) / 2)
-            pull(path, solid, first, first + span < path->count - 1 ? first + span : path->count - 1);
+            pull(path, solid, first, first + span < path->count - 1 ? first + span : path->count - 1, false);
+        if (whole && between(path, 0, path->count - 1) > (1 - 3e-4) * before)
+            break;
+    }
 }
 
 // Length; a leg that is blocked (within a piece of surface, or between joined ones) is measured along its section.
@@ -193,7 +201,7 @@ double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *so
     alb_bends path;
     alb_vector towards, last = start;
     double best = (double)INFINITY;
-    if (alb_slice_direction(&towards, solid, start, end) && alb_slice(&path, solid, start, end, towards)) {
+    if (alb_slice_direction(&towards, solid, start, end) && alb_slice_best(&path, solid, start, end, towards)) {
         best = path.length_mm;
         last = path.at[path.count - 2];
     }

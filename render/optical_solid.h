@@ -68,6 +68,9 @@ void alb_search_run(alb_search *search, const alb_optical_solid *solid, uint32_t
 // surface where the chord leaves the body. False where the surface does not lead back to the chord, or leads through
 // another part of the outside.
 bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to, alb_vector towards);
+// The same in the best of the half planes turned from that one by up to about half a radian.
+bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to,
+                    alb_vector towards);
 // Which half plane the surface where the chord leaves and returns speaks for; false where it does not.
 bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, alb_vector from, alb_vector to);
 
