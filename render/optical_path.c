@@ -73,7 +73,7 @@ static bool try_sheet(alb_optical_paths *paths, double *share, double limit_mm, 
     if (*share >= sheet_share || !has_inside(&solid->voxels)) {
         paths->kind = ALB_OPTICAL_SHEET;
         alb_voxels_free(&solid->voxels);
-        return alb_optical_sheet_prepare(paths->sheet, &solid->net, error);
+        return alb_optical_sheet_prepare(paths->sheet, &solid->net, limit_mm, error);
     }
     alb_optical_sheet_free(paths->sheet);
     free(paths->sheet);

@@ -84,6 +84,7 @@ bool alb_optical_sheet_create(alb_optical_sheet *sheet, const alb_optical_solid 
 void alb_optical_sheet_free(alb_optical_sheet *sheet)
 {
     free(sheet->facing);
+    free(sheet->face);
     free(sheet->feet);
     free(sheet->thickness);
     alb_geodesic_surface_free(&sheet->surface);
@@ -102,10 +103,56 @@ double alb_optical_sheet_share(const alb_optical_sheet *sheet, const alb_surface
     return total > 0 ? thin / total : 0;
 }
 
-bool alb_optical_sheet_prepare(alb_optical_sheet *sheet, const alb_surface_net *net, alb_error *error)
+// Numbers the faces: triangles with a foot joined over edges that bend by less than a right angle.
+static bool find_faces(alb_optical_sheet *sheet, const alb_surface_net *net, alb_error *error)
 {
+    uint32_t *stack = alb_allocate(net->count, sizeof *stack, error);
+    if (!stack || !(sheet->face = alb_allocate(net->count, sizeof *sheet->face, error))) {
+        free(stack);
+        return false;
+    }
+    uint32_t faces = 0; // 0: none
+    for (uint32_t seed = 0; seed < net->count; seed++) {
+        size_t depth = 0;
+        if (sheet->face[seed] || sheet->facing[seed] == UINT32_MAX)
+            continue;
+        sheet->face[seed] = ++faces;
+        stack[depth++] = seed;
+        while (depth > 0) {
+            const uint32_t at = stack[--depth];
+            for (int k = 0; k < 3; k++) {
+                const uint32_t next = net->neighbours[at][k] / 3;
+                if (net->neighbours[at][k] == UINT32_MAX || sheet->face[next] || sheet->facing[next] == UINT32_MAX ||
+                    !(alb_dot(net->normals[at], net->normals[next]) > 0))
+                    continue;
+                sheet->face[next] = faces;
+                stack[depth++] = next;
+            }
+        }
+    }
+    free(stack);
+    return true;
+}
+
+bool alb_optical_sheet_prepare(alb_optical_sheet *sheet, const alb_surface_net *net, double limit_mm, alb_error *error)
+{
+    for (size_t i = 0; i < net->count; i++)
+        if (sheet->thickness[i] > limit_mm)
+            sheet->facing[i] = UINT32_MAX;
+    if (!find_faces(sheet, net, error))
+        return false;
     return alb_geodesic_surface_create(&sheet->surface, (const alb_vector(*)[3])net->triangles,
                                        (const uint32_t(*)[3])net->neighbours, net->count, error);
+}
+
+typedef enum reached { SELF, ACROSS, NEARER } reached;
+
+static reached reached_at(const alb_optical_sheet *sheet, uint32_t from, uint32_t to)
+{
+    const uint32_t facing = sheet->facing[to];
+    if (facing == UINT32_MAX || (sheet->face[from] && sheet->face[from] == sheet->face[to]))
+        return SELF;
+    return sheet->face[from] && sheet->face[from] == sheet->face[facing] ? ACROSS : NEARER;
 }
 
 void alb_optical_sheet_measure(float *distances_mm, unsigned char *opposite, alb_sheet_memory *memory,
@@ -113,24 +160,22 @@ void alb_optical_sheet_measure(float *distances_mm, unsigned char *opposite, alb
                                const uint32_t *to, const alb_vector *points, size_t count, double reach_mm)
 {
     for (size_t k = 0; k < count; k++) {
-        const uint32_t t = to[k], facing = sheet->facing[t];
-        const alb_vector middle = net->middles[t], beside = alb_sub(points[k], middle);
-        alb_geodesic_target *pair = &memory->targets[2 * k];
-        pair[0] = (alb_geodesic_target){.triangle = t, .at = middle, .end = points[k]};
-        pair[1] = pair[0];
-        if (facing != UINT32_MAX) {
-            pair[1].triangle = facing;
-            pair[1].at = sheet->feet[t];
-            pair[1].end = alb_add(sheet->feet[t], beside);
-        }
+        const uint32_t t = to[k];
+        const alb_vector middle = net->middles[t], beside = alb_sub(points[k], middle), foot = sheet->feet[t];
+        const alb_geodesic_target self = {.triangle = t, .at = middle, .end = points[k]},
+                                  across = {.triangle = sheet->facing[t], .at = foot, .end = alb_add(foot, beside)};
+        const reached how = reached_at(sheet, from, t);
+        memory->targets[2 * k] = how == ACROSS ? across : self;
+        memory->targets[2 * k + 1] = how == SELF ? self : across;
     }
     alb_geodesic_run(memory->targets, 2 * count, 2, &memory->geodesic, &sheet->surface, from, net->middles[from],
                      reach_mm);
     for (size_t k = 0; k < count; k++) {
         const alb_geodesic_target *pair = &memory->targets[2 * k];
-        const bool other = sheet->facing[to[k]] != UINT32_MAX && pair[1].to_at_mm < pair[0].to_at_mm;
-        distances_mm[k] = (float)pair[other].distance_mm;
+        const bool second = pair[1].to_at_mm < pair[0].to_at_mm;
+        const reached how = reached_at(sheet, from, to[k]);
+        distances_mm[k] = (float)pair[second].distance_mm;
         if (opposite)
-            opposite[k] = other;
+            opposite[k] = how == ACROSS || (how == NEARER && second);
     }
 }

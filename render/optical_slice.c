@@ -258,6 +258,21 @@ bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, alb_vector
     return true;
 }
 
+bool alb_slice_any(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to)
+{
+    enum { PLANES = 8 };
+    const alb_vector along = alb_unit(alb_sub(to, from));
+    alb_vector up, other, best = {0};
+    double least = (double)INFINITY;
+    alb_tangents(&up, &other, along);
+    for (int k = 0; k < PLANES; k++) {
+        const alb_vector towards = turned(up, along, 2 * M_PI * k / PLANES);
+        if (alb_slice(bends, solid, from, to, towards) && bends->length_mm < least)
+            least = bends->length_mm, best = towards;
+    }
+    return least < (double)INFINITY && alb_slice_best(bends, solid, from, to, best);
+}
+
 bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, alb_vector from, alb_vector to)
 {
     alb_crossing crossings[CROSSINGS];

@@ -11,7 +11,8 @@
 
 // A section that is longer than this times its chord is compared with the graph's path.
 static const double trusted_detour = 1.2;
-enum { FINE_VOXELS = 6000000, ROUNDS = 3, CHAIN = 64 };
+static const double worth_pulling = 1.15; // of the section; what pulling gains at most, commonly
+enum { FINE_VOXELS = 6000000, ROUNDS = 3, CHAIN = 64, TOUCHES = 16 };
 
 static bool fill_starts(alb_optical_solid *solid, alb_error *error)
 {
@@ -191,21 +192,40 @@ static double estimate(const alb_bends *path)
     return length;
 }
 
+// Whether the chord is outside for no longer than rounding: through an edge or a corner.
+static bool only_touches(const alb_optical_solid *solid, alb_vector start, alb_vector end)
+{
+    alb_crossing crossings[TOUCHES];
+    const size_t count = alb_voxels_crossings(crossings, TOUCHES, &solid->voxels, start, end);
+    int inside = 1;
+    double out = 0;
+    if (count < 2 || count > TOUCHES)
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        if (inside <= 0)
+            out += crossings[i].at - crossings[i - 1].at;
+        inside += crossings[i].leaves ? -1 : 1;
+    }
+    return inside > 0 && out * alb_length(alb_sub(end, start)) < 4 * solid->lift_mm;
+}
+
 double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *solid, uint32_t from, uint32_t to,
                                  alb_vector point)
 {
     const alb_vector start = solid->starts[from], end = solid->starts[to], middle = solid->net.middles[to];
     const double chord = alb_length(alb_sub(middle, solid->net.middles[from]));
-    if (from == to || alb_voxels_inside(&solid->voxels, start, end))
+    if (from == to || alb_voxels_inside(&solid->voxels, start, end) || only_touches(solid, start, end))
         return alb_length(alb_sub(point, solid->net.middles[from]));
     alb_bends path;
     alb_vector towards, last = start;
     double best = (double)INFINITY;
-    if (alb_slice_direction(&towards, solid, start, end) && alb_slice_best(&path, solid, start, end, towards)) {
+    if ((alb_slice_direction(&towards, solid, start, end) && alb_slice_best(&path, solid, start, end, towards)) ||
+        alb_slice_any(&path, solid, start, end)) {
         best = path.length_mm;
         last = path.at[path.count - 2];
     }
-    if (best > trusted_detour * chord && graph_path(&path, search, solid, from, to) && estimate(&path) < 0.98 * best) {
+    if (best > trusted_detour * chord && graph_path(&path, search, solid, from, to) &&
+        estimate(&path) < worth_pulling * best) {
         alb_vector corner = {0};
         const double other = pulled(&corner, &path, solid);
         if (other < best)

@@ -71,6 +71,8 @@ bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from
 // The same in the best of the half planes turned from that one by up to about half a radian.
 bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to,
                     alb_vector towards);
+// The best of half planes all around the chord.
+bool alb_slice_any(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to);
 // Which half plane the surface where the chord leaves and returns speaks for; false where it does not.
 bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, alb_vector from, alb_vector to);
 
@@ -87,6 +89,7 @@ double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *so
 // A sheet: the faces of a body and what lies opposite.
 typedef struct alb_optical_sheet {
     uint32_t *facing;  // of each triangle: that which faces it across the sheet; UINT32_MAX: none
+    uint32_t *face;    // of each triangle: which face it belongs to, 1 and up; 0: the rim
     alb_vector *feet;  // where the normal inwards meets that
     double *thickness; // how far off; INFINITY: none
     double median_mm;  // by area
@@ -99,8 +102,8 @@ bool alb_optical_sheet_create(alb_optical_sheet *sheet, const alb_optical_solid 
 void alb_optical_sheet_free(alb_optical_sheet *sheet);
 // Share of the area whose opposing face is nearer than limit_mm.
 double alb_optical_sheet_share(const alb_optical_sheet *sheet, const alb_surface_net *net, double limit_mm);
-// What alb_optical_sheet_measure needs besides.
-bool alb_optical_sheet_prepare(alb_optical_sheet *sheet, const alb_surface_net *net, alb_error *error);
+// What alb_optical_sheet_measure needs besides. What faces nothing within limit_mm is rim.
+bool alb_optical_sheet_prepare(alb_optical_sheet *sheet, const alb_surface_net *net, double limit_mm, alb_error *error);
 
 enum { ALB_SHEET_TARGETS = 1024 };
 typedef struct alb_sheet_memory {

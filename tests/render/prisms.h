@@ -97,8 +97,8 @@ static inline bool region_sees(const plane_region *r, const squares *s, const do
             ((u0 > tiny && u1 < -tiny) || (u0 < -tiny && u1 > tiny)))
             return false;
     }
-    for (int k = 1; k < 200; k++) { // through corners into the outside
-        const double f = k / 200.0, x = a[0] + f * (b[0] - a[0]), y = a[1] + f * (b[1] - a[1]);
+    for (int k = 1; k < 64; k++) { // through corners into the outside
+        const double f = k / 64.0, x = a[0] + f * (b[0] - a[0]), y = a[1] + f * (b[1] - a[1]);
         bool inside = false;
         for (int d = 0; d < 4; d++)
             inside |= square_at(s, (int)floor(x + (d % 2 ? 1e-7 : -1e-7)), (int)floor(y + (d / 2 ? 1e-7 : -1e-7)));
