@@ -151,10 +151,17 @@ bool alb_file_check_target(const char *path, alb_error *error)
     return true;
 }
 
-bool alb_file_same(const char *a, const char *b)
+static bool same_node(const char *a, const char *b)
 {
     struct stat one, other;
     return !stat(a, &one) && !stat(b, &other) && one.st_dev == other.st_dev && one.st_ino == other.st_ino;
+}
+
+bool alb_file_same(const char *a, const char *b)
+{
+    char one[ALB_PATH_SIZE], other[ALB_PATH_SIZE];
+    return same_node(a, b) || (strcmp(alb_path_name(a), alb_path_name(b)) == 0 && alb_path_folder(one, a, NULL) &&
+                               alb_path_folder(other, b, NULL) && same_node(one, other));
 }
 
 bool alb_file_begin(char temporary[ALB_PATH_SIZE], const char *path, alb_error *error)

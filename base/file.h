@@ -18,7 +18,7 @@ bool alb_file_write_text(const char *path, const alb_text *text, alb_error *erro
 // Whether a file could be written there, before the work that makes it: its folder exists and takes files, and what
 // stands at `path` now, if anything, is an ordinary file (a folder or a device is never replaced).
 bool alb_file_check_target(const char *path, alb_error *error);
-// Whether both paths lead to one file that is there.
+// Whether both paths lead to one file, there or yet to be written.
 bool alb_file_same(const char *a, const char *b);
 // For libraries that write a file themselves: choose the temporary name, then commit (rename) or abandon (remove) it.
 // An interrupt (SIGINT, SIGTERM, SIGHUP) removes the temporary files that are under way, 64 of them at most.

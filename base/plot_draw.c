@@ -1,5 +1,5 @@
 // One panel of a plot as SVG: strip, grid, numbers, curves, labels. Curves are clipped by a nested <svg>. Palette:
-// Okabe & Ito 2008, distinguishable with any colour vision.
+// Okabe & Ito 2008, distinguishable with any colour vision; past its end lines are dotted and points hollow.
 #include "base/markup.h"
 #include "base/plot_frame.h"
 
@@ -15,6 +15,24 @@ static const char *colour_of(const alb_panel *panel, size_t c)
     return panel->curves[c].colour ? panel->curves[c].colour : palette[c % PALETTE];
 }
 
+// Whether the palette was used up before curve c: then lines are dotted and points hollow, so that no two are alike up
+// to twice the palette.
+static bool second_round(const alb_panel *panel, size_t c) { return !panel->curves[c].colour && c / PALETTE % 2; }
+
+static const char *dashes_of(const alb_panel *panel, size_t c)
+{
+    if (panel->curves[c].mark == ALB_MARK_DASHES)
+        return second_round(panel, c) ? " stroke-dasharray=\"9 3 2 3\"" : " stroke-dasharray=\"6 4\"";
+    return second_round(panel, c) ? " stroke-dasharray=\"2 3\"" : "";
+}
+
+// Opens or finishes an element in the colour of a curve's points.
+static void points_colour(alb_text *svg, const alb_panel *panel, size_t c)
+{
+    alb_text_add(svg, second_round(panel, c) ? "fill=\"#fff\" stroke=\"" : "stroke=\"none\" fill=\"");
+    alb_markup_add(svg, colour_of(panel, c));
+}
+
 static void text_at(alb_text *svg, double x, double y, const char *attributes, const char *plain)
 {
     alb_text_add(svg, "<text x=\"%.1f\" y=\"%.1f\"%s>", x, y, attributes);
@@ -22,17 +40,18 @@ static void text_at(alb_text *svg, double x, double y, const char *attributes, c
     alb_text_add(svg, "</text>\n");
 }
 
-static void sample(alb_text *svg, const alb_curve *curve, const char *colour, double x, double y)
+static void sample(alb_text *svg, const alb_panel *panel, size_t c, double x, double y)
 {
+    const alb_curve *curve = &panel->curves[c];
     if (curve->mark != ALB_MARK_POINTS) {
         alb_text_add(svg, "<path d=\"M%.1f %.1fh%d\" stroke-width=\"1.8\"%s stroke=\"", x, y, SAMPLE,
-                     curve->mark == ALB_MARK_DASHES ? " stroke-dasharray=\"6 4\"" : "");
-        alb_markup_add(svg, colour);
+                     dashes_of(panel, c));
+        alb_markup_add(svg, colour_of(panel, c));
         alb_text_add(svg, "\"/>\n");
     }
     if (curve->mark == ALB_MARK_POINTS || curve->mark == ALB_MARK_LINE_AND_POINTS) {
-        alb_text_add(svg, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"2.6\" fill=\"", x + SAMPLE / 2.0, y);
-        alb_markup_add(svg, colour);
+        alb_text_add(svg, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"2.6\" ", x + SAMPLE / 2.0, y);
+        points_colour(svg, panel, c);
         alb_text_add(svg, "\"/>\n");
     }
 }
@@ -57,7 +76,7 @@ int alb_plot_strip(alb_text *svg, const alb_panel *panel, const alb_frame *f)
         else if (x + width > f->right && x > f->left)
             x = f->left, y += ALB_PLOT_TITLE_ROW, rows++;
         if (svg) {
-            sample(svg, curve, colour_of(panel, c), x, y + 10);
+            sample(svg, panel, c, x, y + 10);
             text_at(svg, x + SAMPLE + 6, y + 14, "", curve->label);
         }
         x += width + 18;
@@ -134,11 +153,11 @@ static void place(double *x, double *y, const alb_frame *f, const alb_curve *cur
     *y = alb_axis_at(&f->y, curve->y[i]) - f->top;
 }
 
-static void draw_line(alb_text *svg, const alb_panel *panel, const alb_frame *f, const alb_curve *curve)
+static void draw_line(alb_text *svg, const alb_panel *panel, const alb_frame *f, size_t c)
 {
+    const alb_curve *curve = &panel->curves[c];
     bool pen_down = false;
-    alb_text_add(svg, "<path fill=\"none\" stroke-width=\"1.8\" stroke-linejoin=\"round\"%s d=\"",
-                 curve->mark == ALB_MARK_DASHES ? " stroke-dasharray=\"6 4\"" : "");
+    alb_text_add(svg, "<path fill=\"none\" stroke-width=\"1.8\" stroke-linejoin=\"round\"%s d=\"", dashes_of(panel, c));
     for (size_t i = 0; i < curve->count; i++) {
         const bool drawn = alb_plot_drawable(panel, curve, i);
         double x, y;
@@ -192,12 +211,12 @@ static void draw_curves(alb_text *svg, const alb_panel *panel, const alb_frame *
         if (curve->sd)
             draw_bars(svg, panel, f, curve);
         if (curve->mark != ALB_MARK_POINTS)
-            draw_line(svg, panel, f, curve);
+            draw_line(svg, panel, f, c);
         alb_text_add(svg, "</g>\n");
         if (curve->mark != ALB_MARK_POINTS && curve->mark != ALB_MARK_LINE_AND_POINTS)
             continue;
-        alb_text_add(svg, "<g stroke=\"none\" fill=\"");
-        alb_markup_add(svg, colour_of(panel, c));
+        alb_text_add(svg, "<g ");
+        points_colour(svg, panel, c);
         alb_text_add(svg, "\">\n");
         draw_points(svg, panel, f, curve);
         alb_text_add(svg, "</g>\n");

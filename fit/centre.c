@@ -4,11 +4,14 @@
 // none) that stand 8 sd above the median of the image, then the centroid of a window about them; unmeasured pixels
 // count as the brightest there, for they are the saturated core. Refined: Gauss-Newton on the image itself against its
 // own mean profile m(r), a quadratic in every ring (ring.h). A shift d of the centre changes a pixel at direction u by
-// -m'(r) d.u, so that d solves the normal equations of v - m(r) ~ -m'(r) d.u with weights 1 / variance of the ring:
-// rings are made as alike all around as they can be, without any form of profile, and pixels that were not measured do
-// not pull. Glints are looked for about the start and again about the centre found with them left out. The covariance
-// is that of the normal equations, times chi-square / freedom where that is above 1. Stops being true for profiles that
-// are not round: oblique beams (anisotropy.c says so), edges of the sample near the spot.
+// -m'(r) d.u, so that d solves the normal equations of v - m(r) ~ -m'(r) d.u with weights 1 / variance of the ring, the
+// one seen where it is larger (few square pixels on a steep profile are no ring): rings are made as alike all around as
+// they can be, without any form of profile, and pixels that were not measured do not pull. Rings count out to where a
+// fiftieth of the light is left, and once the steps are small a thousandth: noise falls with the light, so the dim
+// rings hold a third of what there is to know, but alone they lead astray. Glints are looked for about the start and
+// again about the centre found with them left out. The covariance is that of the normal equations, times chi-square /
+// freedom where that is above 1. Stops being true for profiles that are not round: oblique beams (anisotropy.c says
+// so), edges of the sample near the spot.
 #include "fit/centre.h"
 #include "base/memory.h"
 #include "base/statistics.h"
@@ -17,7 +20,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SMOOTH = 2, WINDOW = 10, ITERATIONS = 40, DRIFT = 50, SAMPLES_MAX = 100000 };
+enum { SMOOTH = 2, WINDOW = 10, ITERATIONS = 60, DRIFT = 50, SAMPLES_MAX = 100000 };
 
 typedef struct level {
     double median, sd; // of the image; sd of one pixel in its dim parts
@@ -132,11 +135,11 @@ static void move_to_centroid(double *x, double *y, const alb_channel *channel, d
 typedef struct mean_profile {
     alb_rings sorted;
     alb_trend trends[ALB_RINGS_MAX];
-    int used; // rings out to where less than a fiftieth of the highest is left
+    int used; // rings out to where less than a share of the highest is left
 } mean_profile;
 
 static bool profile_about(mean_profile *out, const alb_channel *channel, const bool *glint, const alb_centre *centre,
-                          double background, alb_error *error)
+                          double background, double least_share, alb_error *error)
 {
     alb_rings *rings = &out->sorted;
     double top = 0;
@@ -154,7 +157,7 @@ static bool profile_about(mean_profile *out, const alb_channel *channel, const b
     for (out->used = 0; out->used < ALB_RINGS_MAX; out->used++) {
         const int k = out->used;
         const bool filled = rings->begin[k + 1] > rings->begin[k],
-                   high = filled && out->trends[k].mean - background > 0.02 * top;
+                   high = filled && out->trends[k].mean - background > least_share * top;
         if (inside && filled && !high && k >= 5)
             break;
         inside |= high;
@@ -167,7 +170,8 @@ typedef struct equations {
     double xx, xy, yy, hx, hy, squares, freedom;
 } equations;
 
-static equations of_ring(const alb_ring_pixel *pixels, size_t count, const alb_trend *trend, bool with_variance)
+static equations of_ring(const alb_ring_pixel *pixels, size_t count, const alb_trend *trend, bool with_variance,
+                         bool with_seen)
 {
     equations sum = {.freedom = (double)count - 3};
     double variance = 0, squares = 0;
@@ -182,8 +186,9 @@ static equations of_ring(const alb_ring_pixel *pixels, size_t count, const alb_t
         squares += residual * residual;
         variance += pixels[i].variance / (double)count;
     }
-    if (!with_variance)
-        variance = sum.freedom > 0 ? squares / sum.freedom : 0;
+    const double seen = sum.freedom > 0 ? squares / sum.freedom : 0;
+    if (with_seen) // the pixels' lattice bends steep rings
+        variance = with_variance ? fmax(variance, seen) : seen;
     const double weight = 1 / (variance + 1e-12 * (trend->mean * trend->mean + trend->linear * trend->linear));
     if (!(sum.freedom > 0 && isfinite(weight)))
         return (equations){0};
@@ -192,14 +197,16 @@ static equations of_ring(const alb_ring_pixel *pixels, size_t count, const alb_t
 }
 
 // One Gauss-Newton step and its covariance; false where the equations do not determine it.
-static bool shift_of(double shift_mm[2], double covariance_mm2[3], const mean_profile *profile, bool with_variance)
+static bool shift_of(double shift_mm[2], double covariance_mm2[3], const mean_profile *profile, bool with_variance,
+                     bool with_seen)
 {
     equations sum = {.freedom = -2};
     for (int k = 0; k < profile->used; k++) {
         const size_t begin = profile->sorted.begin[k], count = profile->sorted.begin[k + 1] - begin;
         if (!count)
             continue;
-        const equations one = of_ring(profile->sorted.pixels + begin, count, &profile->trends[k], with_variance);
+        const equations one =
+            of_ring(profile->sorted.pixels + begin, count, &profile->trends[k], with_variance, with_seen);
         sum.xx += one.xx, sum.xy += one.xy, sum.yy += one.yy, sum.hx += one.hx, sum.hy += one.hy;
         sum.squares += one.squares, sum.freedom += one.freedom;
     }
@@ -215,23 +222,34 @@ static bool shift_of(double shift_mm[2], double covariance_mm2[3], const mean_pr
     return true;
 }
 
+// First by the bright rings; then by the dim ones too, unless they lead more than a pixel away.
 static bool refine(alb_centre *centre, const alb_channel *channel, const bool *glint, double background,
                    alb_error *error)
 {
+    const double bright = 0.02, dim = 0.001, pitch = centre->pitch_mm;
+    enum { BRIGHT, DIM, BRIGHT_AGAIN } stage = BRIGHT;
+    alb_centre by_bright = *centre;
     mean_profile *profile = alb_allocate(1, sizeof *profile, error);
     bool ok = profile != NULL;
     for (int iteration = 0; ok && iteration < ITERATIONS; iteration++) {
+        const bool seen = stage == DIM || !channel->variance;
         double shift[2], length = 0;
-        ok = profile_about(profile, channel, glint, centre, background, error);
-        if (ok && shift_of(shift, centre->covariance_mm2, profile, channel->variance != NULL)) {
-            const double most = 3 * centre->pitch_mm;
+        ok = profile_about(profile, channel, glint, centre, background, stage == DIM ? dim : bright, error);
+        if (ok && shift_of(shift, centre->covariance_mm2, profile, channel->variance != NULL, seen)) {
             length = hypot(shift[0], shift[1]);
-            centre->x_mm += fmin(most / length, 1) * shift[0];
-            centre->y_mm += fmin(most / length, 1) * shift[1];
+            centre->x_mm += fmin(3 * pitch / length, 1) * shift[0];
+            centre->y_mm += fmin(3 * pitch / length, 1) * shift[1];
         }
         alb_rings_free(&profile->sorted);
-        if (!(length > 1e-4 * centre->pitch_mm))
+        if (stage == DIM && hypot(centre->x_mm - by_bright.x_mm, centre->y_mm - by_bright.y_mm) > pitch) {
+            *centre = by_bright;
+            stage = BRIGHT_AGAIN;
+        } else if (length == 0 || (stage != BRIGHT && !(length > 1e-4 * pitch))) {
             break;
+        } else if (stage == BRIGHT && length < 0.02 * pitch) {
+            by_bright = *centre;
+            stage = DIM;
+        }
     }
     free(profile);
     return ok;

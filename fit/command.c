@@ -1,6 +1,7 @@
 // alabaster fit: readings of a lit spot -> material.
 #include "base/command.h"
 #include "base/memory.h"
+#include "fit/report_tables.h"
 #include "fit/source.h"
 #include <math.h>
 #include <stdio.h>
@@ -101,15 +102,16 @@ static void print_outcome(const alb_fitting *fitting, alb_side side, int c)
 {
     const alb_outcome *outcome = &fitting->sides[side][c].outcome;
     const alb_fitted *fitted = &outcome->fitted;
-    printf("%-12s %-2s %-19s total %.5g +- %.2g  chi-square %.4g / %d  rms %.2f %%%s\n", alb_side_names[side],
-           fitting->material.channel_names[c], alb_form_name(fitted->profile.form), fitted->total, fitted->total_sd,
-           fitted->chi_square, fitted->degrees_of_freedom, 100 * outcome->rms_relative,
-           fitted->identifiable ? "" : "  NOT DECIDED");
+    char sd[ALB_SD_TEXT_SIZE];
+    printf("%-12s %-2s %-19s total %.5g %s  chi-square %.4g / %d  rms %.2f %%%s\n", alb_side_names[side],
+           fitting->material.channel_names[c], alb_form_name(fitted->profile.form), fitted->total,
+           alb_sd_text(sd, "+-", fitted->total_sd), fitted->chi_square, fitted->degrees_of_freedom,
+           100 * outcome->rms_relative, fitted->identifiable ? "" : "  NOT DECIDED");
     for (int p = 0; p < alb_form_parameter_count(fitted->profile.form); p++)
-        printf("%16s%-22s %.5g +- %.2g\n", "", alb_form_parameter_name(fitted->profile.form, p),
-               fitted->profile.parameters[p], fitted->sd[p]);
-    printf("%16sd ln S / dr %.5g +- %.2g per mm from %.4g to %.4g mm\n", "", outcome->slope_per_mm, outcome->slope_sd,
-           outcome->slope_from_mm, outcome->slope_to_mm);
+        printf("%16s%-22s %.5g %s\n", "", alb_form_parameter_name(fitted->profile.form, p),
+               fitted->profile.parameters[p], alb_sd_text(sd, "+-", fitted->sd[p]));
+    printf("%16sd ln S / dr %.5g %s per mm from %.4g to %.4g mm\n", "", outcome->slope_per_mm,
+           alb_sd_text(sd, "+-", outcome->slope_sd), outcome->slope_from_mm, outcome->slope_to_mm);
 }
 
 static void print_spread(const char *name, const alb_spread *spread, double wanted)

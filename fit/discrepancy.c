@@ -15,16 +15,16 @@
 
 static const double relative_sd_limit = 0.5, first_discrepancy = 0.1;
 
-// The t of sum residual^2 / (sd^2 + t^2 fitted^2) = freedom, by bisection in ln t; 0 where the noise suffices.
-static double discrepancy_of(const alb_readings *readings, const double *fitted, int freedom)
+// By bisection in ln t.
+double alb_discrepancy_of(const double *value, const double *sd, const double *fitted, int count, int freedom)
 {
     double low = 1e-9, high = 1e3;
     for (int iteration = 0; iteration < 60; iteration++) {
         const double middle = sqrt(low * high);
         double sum = 0;
-        for (int i = 0; i < readings->count; i++) {
-            const double residual = readings->value[i] - fitted[i], extra = middle * fitted[i];
-            sum += residual * residual / (readings->sd[i] * readings->sd[i] + extra * extra);
+        for (int i = 0; i < count; i++) {
+            const double residual = value[i] - fitted[i], extra = middle * fitted[i];
+            sum += residual * residual / (sd[i] * sd[i] + extra * extra);
         }
         if (sum > freedom)
             low = middle;
@@ -64,7 +64,7 @@ static bool settle(alb_discrepancy_fit *out, double *sd, alb_candidate candidate
         if (!fitted)
             return false;
         const double before = out->relative;
-        out->relative = discrepancy_of(readings, fitted, freedom);
+        out->relative = alb_discrepancy_of(readings->value, readings->sd, fitted, readings->count, freedom);
         widen(sd, readings, fitted, out->relative);
         free(fitted);
         if (!alb_search_polish(&out->profile, &chi_square, candidate, widened, error))

@@ -10,6 +10,8 @@ typedef struct alb_discrepancy_fit {
     bool decided;    // full rank, and every parameter known to half of itself
 } alb_discrepancy_fit;
 
+// The t of sum (value - fitted)^2 / (sd^2 + t^2 fitted^2) = freedom; 1e-9 where the noise suffices.
+double alb_discrepancy_of(const double *value, const double *sd, const double *fitted, int count, int freedom);
 // Fits one form with its discrepancy and with the energy as a reading of its own; `sd` has room for the readings and
 // holds the widened ones at the end.
 bool alb_discrepancy_search(alb_discrepancy_fit *fit, double *sd, alb_candidate candidate, alb_bases *bases,

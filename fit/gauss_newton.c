@@ -1,23 +1,23 @@
-// J = Q R by Householder reflections (Golub & Van Loan, Matrix Computations, sec. 5.2), columns scaled to unit length:
-// step = -R^-1 Q^T r, covariance = R^-1 R^-T. The condition of J enters once, not squared.
+// Gauss-Newton by QR of the Jacobian (qr.h): step = -R^-1 Q^T r, covariance = R^-1 R^-T.
 //
 // A step is kept where the next one is shorter in units of the standard deviations, |Q^T r|: chi-square itself is flat
 // at a minimum and tells its place to half the digits only. Stops being true far from a minimum and where residuals are
 // so large that Gauss-Newton steps diverge; the parameters are then left as they are.
 #include "fit/gauss_newton.h"
 #include "base/memory.h"
+#include "fit/qr.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct factors {
-    int rows, columns;
-    double *jacobian, *residuals; // R and the reflections; Q^T r
-    double *scale, *diagonal;
+    alb_qr qr; // its right side: residuals, then Q^T r
+    double **column, *jacobian;
 } factors;
 
 static void factors_free(factors *f)
 {
+    free(f->column);
     free(f->jacobian);
     *f = (factors){0};
 }
@@ -25,72 +25,37 @@ static void factors_free(factors *f)
 static bool factors_create(factors *f, const alb_problem *problem, alb_error *error)
 {
     const size_t rows = (size_t)problem->residual_count, columns = (size_t)problem->parameter_count;
-    *f = (factors){.rows = problem->residual_count, .columns = problem->parameter_count};
-    f->jacobian = alb_allocate(rows * columns + rows + 2 * columns, sizeof(double), error);
-    if (!f->jacobian)
+    *f = (factors){.column = alb_allocate(columns, sizeof *f->column, error),
+                   .jacobian = alb_allocate(2 * rows * columns + rows + 2 * columns, sizeof(double), error)};
+    if (!f->column || !f->jacobian) {
+        factors_free(f);
         return false;
-    f->residuals = f->jacobian + rows * columns;
-    f->scale = f->residuals + rows;
-    f->diagonal = f->scale + columns;
+    }
+    for (size_t j = 0; j < columns; j++)
+        f->column[j] = f->jacobian + (columns + j) * rows;
+    double *rest = f->jacobian + 2 * rows * columns;
+    f->qr = (alb_qr){problem->residual_count, problem->parameter_count, f->column, rest, rest + rows,
+                     rest + rows + columns};
     return true;
 }
 
-// Reflects column j into the diagonal, and with it the columns behind it and the residuals.
-static void reflect(factors *f, int j)
-{
-    double *a = f->jacobian;
-    const int n = f->columns;
-    double norm = 0;
-    for (int i = j; i < f->rows; i++)
-        norm += a[i * n + j] * a[i * n + j];
-    norm = a[j * n + j] > 0 ? -sqrt(norm) : sqrt(norm);
-    f->diagonal[j] = norm;
-    a[j * n + j] -= norm;
-    const double half = -norm * a[j * n + j]; // v.v / 2
-    for (int k = j + 1; half > 0 && k <= n; k++) {
-        double product = 0;
-        for (int i = j; i < f->rows; i++)
-            product += a[i * n + j] * (k < n ? a[i * n + k] : f->residuals[i]);
-        for (int i = j; i < f->rows; i++)
-            *(k < n ? &a[i * n + k] : &f->residuals[i]) -= product / half * a[i * n + j];
-    }
-}
-
 // At the parameters; false where the Jacobian is not of full rank or not finite.
-static bool factor(factors *f, double *chi_square, const alb_problem *problem, const double *parameters)
+static bool factor(const factors *f, double *chi_square, const alb_problem *problem, const double *parameters)
 {
-    const int n = f->columns;
-    problem->evaluate(f->residuals, f->jacobian, parameters, problem->context);
+    const alb_qr *qr = &f->qr;
+    problem->evaluate(qr->right, f->jacobian, parameters, problem->context);
     *chi_square = 0;
-    for (int i = 0; i < f->rows; i++)
-        *chi_square += f->residuals[i] * f->residuals[i];
-    for (int j = 0; j < n; j++) {
-        double square = 0;
-        for (int i = 0; i < f->rows; i++)
-            square += f->jacobian[i * n + j] * f->jacobian[i * n + j];
-        f->scale[j] = sqrt(square);
-        // what changes nothing by a change of itself is as good as absent
-        if (!(f->scale[j] * fmax(fabs(parameters[j]), 1) > 1e-13 * sqrt(*chi_square) && isfinite(f->scale[j])))
+    for (int i = 0; i < qr->rows; i++) {
+        *chi_square += qr->right[i] * qr->right[i];
+        for (int j = 0; j < qr->columns; j++)
+            f->column[j][i] = f->jacobian[i * qr->columns + j];
+    }
+    if (!isfinite(*chi_square) || !alb_qr_factor(qr, 1e-13))
+        return false;
+    for (int j = 0; j < qr->columns; j++) // what changes nothing by a change of itself is as good as absent
+        if (!(qr->scale[j] * fmax(fabs(parameters[j]), 1) > 1e-13 * sqrt(*chi_square)))
             return false;
-        for (int i = 0; i < f->rows; i++)
-            f->jacobian[i * n + j] /= f->scale[j];
-    }
-    for (int j = 0; j < n; j++) {
-        reflect(f, j);
-        if (!(fabs(f->diagonal[j]) > 1e-13))
-            return false;
-    }
-    return isfinite(*chi_square);
-}
-
-// x = R^-1 x, in units of the columns' lengths.
-static void back_substitute(double *x, const factors *f)
-{
-    for (int i = f->columns - 1; i >= 0; i--) {
-        for (int k = i + 1; k < f->columns; k++)
-            x[i] -= f->jacobian[i * f->columns + k] * x[k];
-        x[i] /= f->diagonal[i];
-    }
+    return true;
 }
 
 static double length(const double *x, int n)
@@ -122,13 +87,13 @@ bool alb_gauss_newton(double *parameters, double *chi_square, bool *full_rank, c
     *full_rank = problem->residual_count >= n && factor(&f, &reached, problem, parameters);
     bool going = *full_rank && within(parameters, problem);
     for (int step = 0; going && step < 100; step++) {
-        const double before = length(f.residuals, n);
+        const double before = length(f.qr.right, n);
         for (int p = 0; p < n; p++)
-            next[p] = -f.residuals[p];
-        back_substitute(next, &f);
+            next[p] = -f.qr.right[p];
+        alb_qr_back_substitute(next, &f.qr);
         for (int p = 0; p < n; p++)
-            next[p] = parameters[p] + next[p] / f.scale[p];
-        going = within(next, problem) && factor(&f, &reached, problem, next) && length(f.residuals, n) < 0.9 * before &&
+            next[p] = parameters[p] + next[p] / f.qr.scale[p];
+        going = within(next, problem) && factor(&f, &reached, problem, next) && length(f.qr.right, n) < 0.9 * before &&
                 reached <= *chi_square * (1 + 1e-9) + 1e-9 * before * before;
         if (going) {
             memcpy(parameters, next, (size_t)n * sizeof *next);
@@ -144,24 +109,18 @@ bool alb_problem_covariance(double *covariance, bool *full_rank, const double *p
                             alb_error *error)
 {
     const int n = problem->parameter_count;
-    const size_t size = (size_t)n;
+    const size_t size = (size_t)n * (size_t)n;
     factors f;
-    double chi_square, *inverse = alb_allocate(size * size, sizeof *inverse, error); // row q: column q of R^-1
-    memset(covariance, 0, size * size * sizeof *covariance);
-    if (!inverse || !factors_create(&f, problem, error)) {
-        free(inverse);
+    double chi_square, *work = alb_allocate(size, sizeof *work, error);
+    memset(covariance, 0, size * sizeof *covariance);
+    if (!work || !factors_create(&f, problem, error)) {
+        free(work);
         return false;
     }
     *full_rank = problem->residual_count >= n && factor(&f, &chi_square, problem, parameters);
-    for (int q = 0; *full_rank && q < n; q++) {
-        inverse[q * n + q] = 1;
-        back_substitute(inverse + q * n, &f);
-    }
-    for (int p = 0; *full_rank && p < n; p++)
-        for (int q = 0; q < n; q++)
-            for (int k = 0; k < n; k++)
-                covariance[p * n + q] += inverse[k * n + p] * inverse[k * n + q] / f.scale[p] / f.scale[q];
+    if (*full_rank)
+        alb_qr_covariance(covariance, n, &f.qr, work);
     factors_free(&f);
-    free(inverse);
+    free(work);
     return true;
 }

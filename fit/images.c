@@ -42,6 +42,7 @@ void alb_image_properties_put(alb_json *json, const alb_image_properties *p)
                           j->balance * j->relative_sd[ALB_JOINT_BALANCE]);
         alb_json_number(json, "chi_square", j->chi_square);
         alb_json_number(json, "degrees_of_freedom", j->degrees_of_freedom);
+        alb_json_number(json, "discrepancy_relative", j->discrepancy_relative);
         alb_json_numbers(json, "readings", used, ALB_SIDES);
         alb_json_numbers(json, "from_mm", j->from_mm, ALB_SIDES);
         alb_json_number(json, "unscattered_share", j->unscattered);
@@ -54,16 +55,20 @@ void alb_image_properties_put(alb_json *json, const alb_image_properties *p)
 void alb_image_properties_note(alb_text *notes, const char *channel, const alb_image_properties *p)
 {
     const alb_joint *j = &p->joint;
+    char missed[96] = "";
+    if (j->discrepancy_relative > 0)
+        snprintf(missed, sizeof missed, "; it misses the readings by %.2g %% beyond their noise, which is in the sd",
+                 100 * j->discrepancy_relative);
     if (*p->refused)
         alb_text_add(notes, "%s: no optical properties from the images: %s.\n", channel, p->refused);
     if (p->known)
         alb_text_add(
             notes,
             "%s: absorption %.4g +- %.2g, reduced scattering %.4g +- %.2g per mm by radiative transport from the "
-            "images, anisotropy %.3g +- %.2g and scale %.4g +- %.2g fitted, chi-square %.4g / %d.\n",
+            "images, anisotropy %.3g +- %.2g and scale %.4g +- %.2g fitted, chi-square %.4g / %d%s.\n",
             channel, j->absorption_per_mm, j->absorption_per_mm * j->relative_sd[0], j->reduced_scattering_per_mm,
             j->reduced_scattering_per_mm * j->relative_sd[1], j->anisotropy, j->relative_sd[ALB_JOINT_ANISOTROPY],
-            j->scale, j->scale * j->relative_sd[ALB_JOINT_SCALE], j->chi_square, j->degrees_of_freedom);
+            j->scale, j->scale * j->relative_sd[ALB_JOINT_SCALE], j->chi_square, j->degrees_of_freedom, missed);
 }
 
 bool alb_image_properties_check(alb_node object, alb_error *error)
@@ -82,7 +87,8 @@ bool alb_image_properties_check(alb_node object, alb_error *error)
     if (!alb_node_allow(
             images,
             "method absorption_per_mm reduced_scattering_per_mm correlation relative_bound anisotropy scale "
-            "transmission_over_reflection chi_square degrees_of_freedom readings from_mm unscattered_share",
+            "transmission_over_reflection chi_square degrees_of_freedom discrepancy_relative readings from_mm "
+            "unscattered_share",
             error) ||
         !alb_node_number(&value, images, "correlation", -1.001, 1.001, error) ||
         !alb_node_number(&value, images, "chi_square", 0, 1e300, error))

@@ -34,13 +34,14 @@ typedef struct alb_joint {
     double relative_bound[ALB_JOINT_PARAMETERS]; // Cramer and Rao's, of the readings' sd and the model's accuracy alone
     double covariance[ALB_JOINT_PARAMETERS]
                      [ALB_JOINT_PARAMETERS]; // of the logarithms and of g itself, as are relative_sd and relative_bound
-    double chi_square;
+    double chi_square;                       // by the noise alone, of the fit to the noise alone
     int degrees_of_freedom;
+    double discrepancy_relative;  // t: the slab misses the readings by so much of itself; 0: within the noise
     int used[ALB_SIDES];          // readings
     double from_mm[ALB_SIDES];    // the nearest of them to the beam
     double unscattered;           // share of the incident flux that passes straight through, at r = 0: never used
     double albedo, thickness_mfp; // sigma_s' / (sigma_a + sigma_s'), (sigma_a + sigma_s') d
-    char undecided[256];          // why the readings do not decide; empty where they do
+    char undecided[288];          // why the readings do not decide; empty where they do
 } alb_joint;
 
 // Reflection alone will do, with wider intervals. ALB_UNDECIDED where the readings cannot tell absorption from

@@ -2,6 +2,7 @@
 #include "base/record.h"
 #include "fit/ballistic.h"
 #include "fit/energy.h"
+#include "fit/material_check.h"
 #include "fit/offset.h"
 #include "fit/profile.h"
 #include "fit/search.h"
@@ -43,15 +44,25 @@ static void find_images(alb_fitting *fitting)
 }
 
 // What is not a round spot is not decided, whatever the noise makes of a curve through it: more than a third of the
-// pixels left out, or the best form a factor of two off.
+// pixels left out, three quarters of the light beyond the border of the image, or the best form a factor of two off.
 static void doubt(alb_outcome *outcome, const alb_readings *readings)
 {
     if (!outcome->fitted.identifiable)
         return;
+    const double beyond =
+        readings->complete_mm > 0
+            ? 1 - 2 * M_PI * alb_profile_disc(&outcome->fitted.profile, readings->complete_mm) / outcome->fitted.total
+            : 0;
     if (2 * readings->glints > readings->pixels)
         snprintf(outcome->undecided, sizeof outcome->undecided,
                  "%ld of %ld pixels had to be left out as glints, dust or veins: the light is not that of a round spot",
                  readings->glints, readings->pixels + readings->glints);
+    else if (beyond > 0.75)
+        snprintf(
+            outcome->undecided, sizeof outcome->undecided,
+            "the border of the image is %.4g mm from the spot, %.2g %% of its light lies beyond: bring the spot to "
+            "the middle of the picture, or more of the face into it",
+            readings->complete_mm, 100 * beyond);
     else if (outcome->discrepancy_relative > 1)
         snprintf(outcome->undecided, sizeof outcome->undecided,
                  "no form comes nearer to the readings than %.2g %%: this is not the light of a spot",
@@ -163,7 +174,11 @@ static void put_outcome(alb_json *json, const char *side, const alb_outcome *out
         alb_json_numbers(json, NULL, fitted->covariance[p], (size_t)n);
     alb_json_end_list(json);
     alb_json_number(json, "condition", outcome->knowledge.condition);
-    put_known(json, "total", fitted->total, fitted->total_sd, &outcome->knowledge.total, false);
+    alb_certainty known = outcome->knowledge.total;
+    const bool undecided = !isfinite(fitted->total_sd);
+    if (undecided)
+        snprintf(known.because, sizeof known.because, "%.*s", ALB_BECAUSE_SIZE - 1, outcome->undecided);
+    put_known(json, "total", fitted->total, fitted->total_sd, &known, undecided);
     alb_json_number(json, "total_without_inner_fifth", outcome->sensitivity.without_inner);
     alb_json_number(json, "total_without_outer_fifth", outcome->sensitivity.without_outer);
     if (outcome->offset_sd > 0)
@@ -264,8 +279,6 @@ static bool check_covariance(const alb_fitted *fitted, int n, alb_node node, alb
     return true;
 }
 
-static const char estimate_keys[] = "value sd interval_95 cramer_rao_sd identifiable because";
-
 static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
 {
     alb_profile *profile = &fitted->profile;
@@ -278,7 +291,7 @@ static bool read_parameters(alb_fitted *fitted, alb_node node, alb_error *error)
     for (int p = 0; p < n; p++) {
         const char *name = alb_form_parameter_name(profile->form, p);
         strncat(strncat(names, name, 60), " ", 2);
-        if (!alb_node_object(&one, parameters, name, error) || !alb_node_allow(one, estimate_keys, error) ||
+        if (!alb_estimate_check(parameters, name, error) || !alb_node_object(&one, parameters, name, error) ||
             !alb_node_number(&profile->parameters[p], one, "value", -1e300, 1e300, error) ||
             (fitted->identifiable && !alb_node_number(&fitted->sd[p], one, "sd", 0, 1e300, error)))
             return false;
@@ -313,8 +326,8 @@ static bool read_fitted(alb_fitted *fitted, alb_node node, alb_error *error)
     if (!alb_form_from_name(&fitted->profile.form, form))
         return alb_node_fail(error, node, "form", "unknown form '%s'", form);
     if (!alb_node_boolean(&fitted->identifiable, node, "identifiable", error) ||
-        !read_parameters(fitted, node, error) || !alb_node_object(&total, node, "total", error) ||
-        !alb_node_allow(total, estimate_keys, error) ||
+        !read_parameters(fitted, node, error) || !alb_estimate_check(node, "total", error) ||
+        !alb_outcome_check(node, error) || !alb_node_object(&total, node, "total", error) ||
         !alb_node_number(&fitted->total, total, "value", 0, 1e300, error) ||
         (fitted->identifiable && !alb_node_number(&fitted->total_sd, total, "sd", 0, 1e300, error)) ||
         !alb_node_number(&fitted->chi_square, node, "chi_square", 0, 1e300, error) ||

@@ -47,8 +47,8 @@ double alb_profile_ring(const alb_profile *profile, double inner_mm, double oute
 
 // A profile with what is known of it.
 typedef struct alb_fitted {
-    alb_profile profile; // form NONE: not measured
-    double sd[ALB_PARAMETERS_MAX];
+    alb_profile profile;           // form NONE: not measured
+    double sd[ALB_PARAMETERS_MAX]; // NaN, as total_sd, where the readings say nothing of it
     double covariance[ALB_PARAMETERS_MAX][ALB_PARAMETERS_MAX];
     double total, total_sd;
     double chi_square;

@@ -28,34 +28,61 @@ typedef struct row {
 
 static double grid_at(int k, double end_mm) { return end_mm * ((double)k / (GRID - 1)) * ((double)k / (GRID - 1)); }
 
-static void add_mass(row *out, double rho_mm, double mass, double end_mm)
+// Directions of equal shares of a turn that are dense about 0, and what splits a mass between grid points.
+typedef struct quadrature {
+    double cosine[DIRECTIONS], share[DIRECTIONS], per_spacing[GRID - 1]; // 1 / (2 k + 1)
+    double per_mm;                                                       // distances to squares of grid indices
+} quadrature;
+
+static void add_mass(row *out, double square, int k, double mass, const quadrature *by)
 {
-    int k = (int)(sqrt(rho_mm / end_mm) * (GRID - 1));
-    k = k < GRID - 2 ? k : GRID - 2;
-    const double low = grid_at(k, end_mm), high = grid_at(k + 1, end_mm);
-    const double upper = fmin(fmax((rho_mm - low) / (high - low), 0), 1);
+    const double upper = fmin(fmax((square - (double)k * k) * by->per_spacing[k], 0), 1);
     out->weight[k] += mass * (1 - upper);
     out->weight[k + 1] += mass * upper;
     out->first = k < out->first ? k : out->first;
     out->last = k + 1 > out->last ? k + 1 : out->last;
 }
 
-static void fill_row(row *out, const double *r_mm, const double *share, const alb_spot *spot, const double *cosine,
-                     const double *direction_share, double end_mm)
+// Squares of the grid indices of the distances between a pixel at r and a spot sample at s, and the points below them.
+ALB_VECTOR_CLONES
+static void distances(double square[DIRECTIONS], int below[DIRECTIONS], double r, double s, const quadrature *by)
+{
+    for (int k = 0; k < DIRECTIONS; k++) {
+        const double squared = r * r + s * s - 2 * r * s * by->cosine[k];
+        square[k] = by->per_mm * sqrt(squared > 0 ? squared : 0);
+        const double index = sqrt(square[k]);
+        below[k] = (int)(index < GRID - 2 ? index : GRID - 2);
+    }
+}
+
+static void fill_row(row *out, const double *r_mm, const double *share, const alb_spot *spot, const quadrature *by)
 {
     *out = (row){.first = GRID, .last = -1};
     for (int i = 0; i < ALB_RING_SAMPLES; i++)
         for (int j = 0; share[i] > 0 && j < spot->count; j++) {
-            const double r = r_mm[i], s = spot->r_mm[j], mass = share[i] * spot->share[j];
-            if (s == 0) {
-                add_mass(out, r, mass, end_mm);
+            const double mass = share[i] * spot->share[j];
+            double square[DIRECTIONS];
+            int below[DIRECTIONS];
+            distances(square, below, r_mm[i], spot->r_mm[j], by);
+            if (spot->r_mm[j] == 0) {
+                add_mass(out, square[0], below[0], mass, by);
                 continue;
             }
-            for (int k = 0; k < DIRECTIONS; k++) {
-                const double squared = r * r + s * s - 2 * r * s * cosine[k];
-                add_mass(out, sqrt(squared > 0 ? squared : 0), mass * direction_share[k], end_mm);
-            }
+            for (int k = 0; k < DIRECTIONS; k++)
+                add_mass(out, square[k], below[k], mass * by->share[k], by);
         }
+}
+
+static void quadrature_create(quadrature *by, double end_mm)
+{
+    by->per_mm = (double)(GRID - 1) * (GRID - 1) / end_mm;
+    for (int k = 0; k < DIRECTIONS; k++) {
+        const double t = (k + 0.5) / DIRECTIONS;
+        by->cosine[k] = cos(M_PI * t - sin(2 * M_PI * t) / 2);
+        by->share[k] = (1 - cos(2 * M_PI * t)) / DIRECTIONS;
+    }
+    for (int k = 0; k < GRID - 1; k++)
+        by->per_spacing[k] = 1.0 / (2 * k + 1);
 }
 
 static bool allocate(alb_operator *forward, int rows, int grid, alb_error *error)
@@ -77,24 +104,21 @@ bool alb_operator_create(alb_operator *forward, const alb_readings *readings, co
     rows = alb_allocate((size_t)readings->count, sizeof *rows, error);
     if (!rows)
         goto done;
-    double end_mm = 0, spot_mm = 0, cosine[DIRECTIONS], share[DIRECTIONS];
-    for (int k = 0; k < DIRECTIONS; k++) {
-        const double t = (k + 0.5) / DIRECTIONS;
-        cosine[k] = cos(M_PI * t - sin(2 * M_PI * t) / 2);
-        share[k] = (1 - cos(2 * M_PI * t)) / DIRECTIONS;
-    }
+    double end_mm = 0, spot_mm = 0;
+    quadrature by;
     for (int i = 0; i < readings->count; i++)
         for (int k = 0; k < ALB_RING_SAMPLES; k++)
             end_mm = fmax(end_mm, readings->sample_r_mm[i][k]);
     for (int j = 0; j < spot->count; j++)
         spot_mm = fmax(spot_mm, spot->r_mm[j]);
     end_mm = (end_mm + spot_mm) * (1 + 1e-9);
+    quadrature_create(&by, end_mm);
     for (int k = 0; k < GRID; k++)
         forward->grid_mm[k] = grid_at(k, end_mm);
     forward->grid_mm[0] = forward->grid_mm[1] / 4;
 #pragma omp parallel for schedule(dynamic)
     for (int i = 0; i < readings->count; i++)
-        fill_row(&rows[i], readings->sample_r_mm[i], readings->sample_share[i], spot, cosine, share, end_mm);
+        fill_row(&rows[i], readings->sample_r_mm[i], readings->sample_share[i], spot, &by);
     for (int i = 0; i < readings->count; i++) {
         forward->first[i] = rows[i].first;
         forward->last[i] = rows[i].last;

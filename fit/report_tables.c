@@ -28,14 +28,23 @@ static const char *interval(char text[64], const alb_certainty *certainty)
     return text;
 }
 
+const char *alb_sd_text(char text[ALB_SD_TEXT_SIZE], const char *sign, double sd)
+{
+    if (isfinite(sd))
+        snprintf(text, ALB_SD_TEXT_SIZE, "%s %.2g", sign, sd);
+    else
+        snprintf(text, ALB_SD_TEXT_SIZE, "(undecided)");
+    return text;
+}
+
 static void put_profile(alb_page *page, const char *side, const char *channel, const alb_measurement *measurement)
 {
     const alb_outcome *outcome = &measurement->outcome;
     const alb_fitted *fitted = &outcome->fitted;
-    char range[64];
-    alb_page_row(page, "%s|%s|%s%s|%.5g ± %.2g|%s|%.4g / %d|%.2f|%.2f|%.1f|%s", side, channel,
+    char range[64], sd[ALB_SD_TEXT_SIZE];
+    alb_page_row(page, "%s|%s|%s%s|%.5g %s|%s|%.4g / %d|%.2f|%.2f|%.1f|%s", side, channel,
                  alb_form_name(fitted->profile.form), outcome->tied ? ", b2 = 1.1 b1" : "", fitted->total,
-                 fitted->total_sd, interval(range, &outcome->knowledge.total), fitted->chi_square,
+                 alb_sd_text(sd, "±", fitted->total_sd), interval(range, &outcome->knowledge.total), fitted->chi_square,
                  fitted->degrees_of_freedom, 100 * outcome->discrepancy_relative, 100 * outcome->rms_relative,
                  100 * outcome->measured_share, *outcome->undecided ? outcome->undecided : "decided");
 }
@@ -57,9 +66,14 @@ static void put_parameters(alb_page *page, const char *side, const char *channel
     char range[64];
     for (int p = 0; p < alb_form_parameter_count(fitted->profile.form); p++) {
         const alb_certainty *known = &outcome->knowledge.parameters[p];
-        alb_page_row(page, "%s|%s|%s|%.5g|%.2g|%s|%.2g|%s", side, channel,
-                     alb_form_parameter_name(fitted->profile.form, p), fitted->profile.parameters[p], fitted->sd[p],
-                     interval(range, known), known->cramer_rao_sd, *known->because ? known->because : "identifiable");
+        char sd[24] = "undecided", bound[24] = "–";
+        if (isfinite(fitted->sd[p]))
+            snprintf(sd, sizeof sd, "%.2g", fitted->sd[p]);
+        if (isfinite(known->cramer_rao_sd))
+            snprintf(bound, sizeof bound, "%.2g", known->cramer_rao_sd);
+        alb_page_row(page, "%s|%s|%s|%.5g|%s|%s|%s|%s", side, channel, alb_form_parameter_name(fitted->profile.form, p),
+                     fitted->profile.parameters[p], sd, interval(range, known), bound,
+                     *known->because ? known->because : "identifiable");
     }
 }
 
@@ -139,12 +153,18 @@ void alb_report_energy(alb_page *page, const alb_fitting *fitting)
         const alb_fitted *one = &r->outcome.fitted, *other = &t->outcome.fitted;
         const double sum = one->total + other->total, sd = hypot(one->total_sd, other->total_sd);
         const double freely = r->outcome.free_total + t->outcome.free_total;
-        char held[48] = "not held";
+        char held[48] = "not held", cells[ALB_SIDES][64], text[ALB_SD_TEXT_SIZE];
         if (freely > sum * (1 + 1e-12))
             snprintf(held, sizeof held, "%.5g", freely);
-        alb_page_row(page, "%s|%.5g ± %.2g|%.5g ± %.2g|%.5g ± %.2g|%.5g|%.2g|%s", fitting->material.channel_names[c],
-                     one->total, one->total_sd, other->total, other->total_sd, sum, sd, 1 - sum, beyond(r) + beyond(t),
-                     held);
+        for (int side = 0; side < ALB_SIDES; side++) {
+            const alb_fitted *fitted = side ? other : one;
+            snprintf(cells[side], sizeof cells[side], "–");
+            if (fitting->sides[side][c].measured)
+                snprintf(cells[side], sizeof cells[side], "%.5g %s", fitted->total,
+                         alb_sd_text(text, "±", fitted->total_sd));
+        }
+        alb_page_row(page, "%s|%s|%s|%.5g %s|%.5g|%.2g|%s", fitting->material.channel_names[c], cells[0], cells[1], sum,
+                     alb_sd_text(text, "±", sd), 1 - sum, beyond(r) + beyond(t), held);
     }
     alb_page_end_table(page);
     if (!fitting->absolute)

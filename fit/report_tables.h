@@ -3,6 +3,10 @@
 #include "base/page.h"
 #include "fit/measurement.h"
 
+// "± 0.12" with the sign given; "(undecided)" where there is no sd.
+enum { ALB_SD_TEXT_SIZE = 32 };
+const char *alb_sd_text(char text[ALB_SD_TEXT_SIZE], const char *sign, double sd);
+
 void alb_report_profiles(alb_page *page, const alb_fitting *fitting);
 void alb_report_parameters(alb_page *page, const alb_fitting *fitting);
 void alb_report_correlations(alb_page *page, const alb_fitting *fitting);

@@ -7,7 +7,9 @@
 typedef struct alb_problem {
     int parameter_count, residual_count;
     // Fills the whitened residuals and, where not NULL, their Jacobian (row-major, residual_count x parameter_count).
-    // Must not fail; values that are not finite make the solver shorten its step.
+    // Must not fail; values that are not finite make the solver shorten its step. chi-square and the sd scaled by it
+    // have the digits that the residuals have: where those are below 1e-9 of the values, subtract in extended
+    // precision.
     void (*evaluate)(double *residuals, double *jacobian, const double *parameters, const void *context);
     const void *context;
     const double *lower, *upper; // bounds of the parameters

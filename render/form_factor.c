@@ -1,99 +1,225 @@
 // F_kj, the share of the flux leaving k that arrives at j, by R cosine-weighted rays from every patch:
 //     F_kj = (number of rays of k that hit j) / R
-// Ray q of a patch with normal n, tangents t, b and one uniform pair s1, s2 a patch (Cranley-Patterson rotation):
-//     u = frac((q + 1/2)/R + s1),  v = frac(0.6180339887498949 q + s2)        Fibonacci (golden-ratio) lattice
-//     d = sqrt(1-u) n + sqrt(u) (cos 2 pi v t + sin 2 pi v b)                 cosine-weighted hemisphere
-// The origin is a uniform point of the triangle, fresh for each ray. Random numbers are a function of (seed, patch, q).
+// (render/form_factor_cast.c: their pattern; render/form_factor_rows.c: how they are kept and multiplied.)
 // A row of F only ever integrates a bounded function over the hemisphere, which is why a few hundred equal weights do
 // for any number of patches. The rows hold exactly (they sum to 1 with the sky); reciprocity A_k F_kj = A_j F_jk holds
 // only statistically. Never symmetrised or normalised: that raises the error.
 // Where it stops being true: sources that cover less than ~1/R of a hemisphere (a small bright lamp) are seen by few
-// rays; patches large against the scene would need their origins stratified too.
+// rays.
 #include "render/form_factor.h"
 #include "base/memory.h"
-#include "base/random.h"
+#include "base/progress.h"
+#include "render/form_factor_cast.h"
+#include <omp.h>
 #include <stdlib.h>
+#include <string.h>
 
-enum { HITS_MAX = 1 << 29 };
-
-static double fraction(double x) { return x - floor(x); }
-
-static alb_vector direction_of(const alb_form_factors *factors, alb_vector normal, size_t patch, int q)
+// Where the bits of a chunk begin, in words: chunks share none.
+static size_t first_word(const alb_form_factors *factors, size_t chunk)
 {
-    alb_random random =
-        alb_random_at(factors->seed, 2 * patch, factors->sampling == ALB_SAMPLING_RANDOM ? (uint64_t)q : 0);
-    const double s1 = alb_random_uniform(&random), s2 = alb_random_uniform(&random);
-    double u = s1, v = s2;
-    if (factors->sampling == ALB_SAMPLING_LATTICE) {
-        u = fraction((q + 0.5) / factors->rays + s1);
-        v = fraction(0.6180339887498949 * q + s2);
+    return factors->rows.first[chunk * ALB_CHUNK_ROWS] / 64 + chunk;
+}
+
+static uint64_t *sky_word(const alb_form_factors *factors, size_t patch, size_t q, uint64_t *bit)
+{
+    const size_t chunk = patch / ALB_CHUNK_ROWS;
+    const size_t ray = factors->rows.first[patch] - factors->rows.first[chunk * ALB_CHUNK_ROWS] + q;
+    *bit = 1ULL << ray % 64;
+    return factors->sky_mask + first_word(factors, chunk) + ray / 64;
+}
+
+bool alb_form_factors_sees_sky(const alb_form_factors *factors, size_t patch, int q)
+{
+    uint64_t bit;
+    return factors->sky_mask && (*sky_word(factors, patch, (size_t)q, &bit) & bit);
+}
+
+// Counts what a patch's rays meet beside patches.
+static void note_row(alb_form_factors *factors, const uint32_t *hits, size_t patch)
+{
+    const size_t rays = (size_t)alb_form_factors_rays(factors, patch);
+    size_t sky = 0, back = 0;
+    uint64_t bit;
+    for (size_t q = 0; q < rays; q++) {
+        if (hits[q] == factors->patch_count) {
+            uint64_t *word = sky_word(factors, patch, q, &bit);
+            *word |= bit;
+            sky++;
+        }
+        back += hits[q] == factors->patch_count + 1;
     }
-    alb_vector t, b;
-    alb_tangents(&t, &b, normal);
-    const double side = sqrt(u), angle = 2 * M_PI * v;
-    const alb_vector in_plane = alb_add(alb_times(cos(angle), t), alb_times(sin(angle), b));
-    return alb_add(alb_times(sqrt(1 - u), normal), alb_times(side, in_plane));
+    factors->sky_shares[patch] = (float)sky / (float)rays;
+    factors->back_shares[patch] = (float)back / (float)rays;
+    __atomic_add_fetch(&factors->sky_rays, sky, __ATOMIC_RELAXED); // counting is the same in any order
+    __atomic_add_fetch(&factors->back_rays, back, __ATOMIC_RELAXED);
 }
 
-alb_vector alb_form_factors_direction(const alb_form_factors *factors, const alb_patches *patches, size_t patch, int q)
+static bool allocate(alb_form_factors *factors, const uint32_t *lengths, alb_error *error)
 {
-    return direction_of(factors, patches->normals[patch], patch, q);
+    const size_t n = factors->patch_count;
+    return alb_hit_rows_create(&factors->rows, lengths, n, n + 2, factors->memory_bytes, error) &&
+           (factors->sky_shares = alb_allocate(n, sizeof(float), error)) &&
+           (factors->back_shares = alb_allocate(n, sizeof(float), error)) &&
+           (factors->gathered = alb_allocate(n + 2, sizeof *factors->gathered, error)) &&
+           (factors->sky_mask =
+                alb_allocate(factors->rows.first[n] / 64 + factors->rows.chunks + 1, sizeof *factors->sky_mask, error));
 }
 
-static uint32_t cast(const alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer,
-                     size_t patch, int q)
+// Where the hits come from: given in `hits`, or cast.
+typedef struct source {
+    const uint32_t *hits;
+    const alb_patches *patches;
+    const alb_tracer *tracer;
+} source;
+
+static void take_row(uint32_t *row, alb_form_factors *factors, const source *from, size_t patch)
 {
-    alb_random random = alb_random_at(factors->seed, 2 * patch + 1, (uint64_t)q);
-    const double u = alb_random_uniform(&random), v = alb_random_uniform(&random);
-    const alb_vector origin = alb_patch_point(patches, patch, u, v);
-    alb_hit hit;
-    if (!alb_tracer_closest(&hit, tracer, origin, direction_of(factors, patches->normals[patch], patch, q)))
-        return (uint32_t)patches->count;
-    return hit.front ? hit.face : (uint32_t)patches->count + 1;
+    const int rays = alb_form_factors_rays(factors, patch);
+    if (from->hits) {
+        memcpy(row, from->hits + factors->rows.first[patch], (size_t)rays * sizeof *row);
+    } else {
+        const alb_ray_pattern pattern = {rays, factors->seed, factors->sampling};
+        const size_t slipped = alb_rays_cast(row, &pattern, from->patches, from->tracer, patch);
+        __atomic_add_fetch(&factors->reshot_rays, slipped, __ATOMIC_RELAXED); // counting is the same in any order
+    }
+    note_row(factors, row, patch);
+}
+
+static bool fill(alb_form_factors *factors, const source *from, alb_error *error)
+{
+    const size_t n = factors->patch_count, largest = alb_hit_rows_largest_chunk(&factors->rows);
+    const size_t room = largest + ALB_RAYS_MAX;
+    long done = 0;
+    alb_progress progress;
+    uint32_t *hits = alb_allocate((size_t)omp_get_max_threads(), room * sizeof *hits, error);
+    if (!hits)
+        return false;
+    alb_progress_begin(&progress, "form factors", (long)factors->rows.chunks);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t chunk = 0; chunk < factors->rows.chunks; chunk++) {
+        uint32_t *mine = hits + (size_t)omp_get_thread_num() * room, *row = mine;
+        for (size_t p = chunk * ALB_CHUNK_ROWS; p < n && p < (chunk + 1) * ALB_CHUNK_ROWS; p++) {
+            take_row(row, factors, from, p);
+            row += alb_form_factors_rays(factors, p);
+        }
+        alb_hit_rows_fill(&factors->rows, chunk, mine, mine + largest);
+        const long so_far = __atomic_add_fetch(&done, 1, __ATOMIC_RELAXED);
+        if (omp_get_thread_num() == 0)
+            alb_progress_at(&progress, so_far);
+    }
+    alb_progress_end(&progress);
+    free(hits);
+    if (!factors->sky_rays) {
+        free(factors->sky_mask);
+        factors->sky_mask = NULL;
+    }
+    return true;
+}
+
+static bool build(alb_form_factors *factors, const source *from, const uint32_t *lengths, alb_error *error)
+{
+    const bool ok = allocate(factors, lengths, error) && fill(factors, from, error);
+    if (!ok)
+        alb_form_factors_free(factors);
+    return ok;
+}
+
+static bool build_even(alb_form_factors *factors, const source *from, alb_error *error)
+{
+    uint32_t *lengths = alb_allocate(factors->patch_count, sizeof *lengths, error);
+    for (size_t p = 0; lengths && p < factors->patch_count; p++)
+        lengths[p] = (uint32_t)factors->rays;
+    const bool ok = lengths && build(factors, from, lengths, error);
+    free(lengths);
+    return ok;
+}
+
+bool alb_form_factors_create_within(alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer,
+                                    int rays, uint64_t seed, alb_sampling sampling, size_t memory_bytes,
+                                    alb_error *error)
+{
+    *factors = (alb_form_factors){
+        .patch_count = patches->count, .rays = rays, .seed = seed, .sampling = sampling, .memory_bytes = memory_bytes};
+    return build_even(factors, &(source){.patches = patches, .tracer = tracer}, error);
 }
 
 bool alb_form_factors_create(alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer, int rays,
                              uint64_t seed, alb_sampling sampling, alb_error *error)
 {
-    const size_t n = patches->count;
-    *factors = (alb_form_factors){.patch_count = n, .rays = rays, .seed = seed, .sampling = sampling};
-    if (n > HITS_MAX / (size_t)rays)
-        return alb_fail(error, ALB_BAD_DATA,
-                        "%zu patches with %d rays each need %.1f GiB, more than the 2 GiB that form factors may take; "
-                        "use a coarser mesh or fewer rays_per_patch",
-                        n, rays, (double)n * rays * sizeof *factors->hits / 0x1p30);
-    if (!(factors->hits = alb_allocate(n * (size_t)rays, sizeof *factors->hits, error)))
+    return alb_form_factors_create_within(factors, patches, tracer, rays, seed, sampling, 0, error);
+}
+
+bool alb_form_factors_from_hits(alb_form_factors *factors, const uint32_t *hits, size_t patch_count, int rays,
+                                alb_error *error)
+{
+    *factors = (alb_form_factors){.patch_count = patch_count, .rays = rays};
+    return build_even(factors, &(source){.hits = hits}, error);
+}
+
+bool alb_form_factors_cast_again(alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer,
+                                 const uint32_t *lengths, alb_error *error)
+{
+    alb_form_factors again = {.patch_count = factors->patch_count,
+                              .rays = factors->rays,
+                              .seed = factors->seed,
+                              .sampling = factors->sampling,
+                              .memory_bytes = factors->memory_bytes};
+    if (!build(&again, &(source){.patches = patches, .tracer = tracer}, lengths, error))
         return false;
-#pragma omp parallel for schedule(dynamic, 64)
-    for (size_t patch = 0; patch < n; patch++)
-        for (int q = 0; q < rays; q++)
-            factors->hits[patch * (size_t)rays + (size_t)q] = cast(factors, patches, tracer, patch, q);
-    for (size_t i = 0; i < n * (size_t)rays; i++) {
-        factors->sky_rays += factors->hits[i] == n;
-        factors->back_rays += factors->hits[i] == n + 1;
-    }
+    alb_form_factors_free(factors);
+    *factors = again;
     return true;
 }
 
 void alb_form_factors_free(alb_form_factors *factors)
 {
-    free(factors->hits);
+    alb_hit_rows_free(&factors->rows);
+    free(factors->sky_shares);
+    free(factors->back_shares);
+    free(factors->sky_mask);
+    free(factors->gathered);
     *factors = (alb_form_factors){0};
+}
+
+size_t alb_form_factors_bytes(const alb_form_factors *factors)
+{
+    const size_t n = factors->patch_count, words = factors->rows.first[n] / 64 + factors->rows.chunks + 1;
+    return alb_hit_rows_bytes(&factors->rows) + 2 * n * sizeof(float) + (n + 2) * sizeof *factors->gathered +
+           (factors->sky_mask ? words * sizeof *factors->sky_mask : 0);
+}
+
+void alb_form_factors_row(uint32_t *hits, const alb_form_factors *factors, size_t patch)
+{
+    alb_hit_rows_read(hits, &factors->rows, patch);
+}
+
+alb_vector alb_form_factors_direction(const alb_form_factors *factors, const alb_patches *patches, size_t patch, int q)
+{
+    const alb_ray_pattern pattern = {alb_form_factors_rays(factors, patch), factors->seed, factors->sampling};
+    return alb_ray_direction(&pattern, patches, patch, q);
+}
+
+// --- products --------------------------------------------------------------------------------------------------------
+static void take_values(const alb_form_factors *factors, const double (*radiosity)[3], const double sky[3])
+{
+    const size_t n = factors->patch_count;
+#pragma omp parallel for schedule(static)
+    for (size_t p = 0; p < n; p++)
+        for (int c = 0; c < 3; c++)
+            factors->gathered[p][c] = (float)radiosity[p][c];
+    for (int c = 0; c < 3; c++)
+        factors->gathered[n][c] = sky ? (float)sky[c] : 0;
 }
 
 void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3])
 {
-    const size_t n = factors->patch_count, rays = (size_t)factors->rays;
-#pragma omp parallel for schedule(static)
-    for (size_t patch = 0; patch < n; patch++) {
-        double sum[3] = {0};
-        for (size_t q = 0; q < rays; q++) {
-            const uint32_t hit = factors->hits[patch * rays + q];
-            if (hit < n)
-                for (int c = 0; c < 3; c++)
-                    sum[c] += radiosity[hit][c];
-        }
-        for (int c = 0; c < 3; c++)
-            out[patch][c] = sum[c] / (double)rays;
-    }
+    take_values(factors, radiosity, NULL);
+    alb_hit_rows_gather(out, &factors->rows, (const float(*)[4])factors->gathered);
+}
+
+void alb_form_factors_half_difference(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3],
+                                      const double sky[3])
+{
+    take_values(factors, radiosity, sky);
+    alb_hit_rows_gather_difference(out, &factors->rows, (const float(*)[4])factors->gathered);
 }

@@ -47,20 +47,20 @@ void alb_light_sky(double radiance[3], const alb_light *light, alb_vector direct
 static void add_environment(double (*irradiance)[3], const alb_light *light, const alb_patches *patches,
                             const alb_form_factors *factors)
 {
-    const size_t n = patches->count, rays = (size_t)factors->rays;
 #pragma omp parallel for schedule(dynamic, 64)
-    for (size_t p = 0; p < n; p++) {
+    for (size_t p = 0; p < patches->count; p++) {
         double sum[3] = {0};
-        for (size_t q = 0; q < rays; q++) {
-            if (factors->hits[p * rays + q] != n)
+        const int rays = alb_form_factors_rays(factors, p);
+        for (int q = 0; q < rays; q++) {
+            if (!alb_form_factors_sees_sky(factors, p, q))
                 continue;
             double radiance[3];
-            alb_light_sky(radiance, light, alb_form_factors_direction(factors, patches, p, (int)q));
+            alb_light_sky(radiance, light, alb_form_factors_direction(factors, patches, p, q));
             for (int c = 0; c < 3; c++)
                 sum[c] += radiance[c];
         }
         for (int c = 0; c < 3; c++)
-            irradiance[p][c] += M_PI * sum[c] / (double)rays;
+            irradiance[p][c] += M_PI * sum[c] / rays;
     }
 }
 
@@ -71,7 +71,7 @@ static double point_share(const alb_light *light, const alb_patches *patches, co
     double sum = 0;
     alb_random random = alb_random_at(seed, stream, patch);
     const double nearest2 = 0.01 * patches->areas_mm2[patch];
-    for (int k = 0; k < POINTS * POINTS; k++) {
+    for (int k = 0; k < POINTS * POINTS && !alb_patch_buried(patches, patch); k++) {
         const double u = (k % POINTS + alb_random_uniform(&random)) / POINTS;
         const double v = ((double)(k / POINTS) + alb_random_uniform(&random)) / POINTS;
         const alb_vector point = alb_patch_point(patches, patch, u, v), to = alb_sub(light->position_mm, point);

@@ -39,7 +39,7 @@ static inline const char *said_path(const char *stream)
 // Exit code of `alabaster ARGUMENTS`; 128 + signal where it died, 124 where it hung.
 static inline int run(const char *arguments)
 {
-    const int status = shell("timeout 60 '%s' %s >program_%d_out.tmp 2>program_%d_err.tmp", ALB_PROGRAM, arguments,
+    const int status = shell("timeout 600 '%s' %s >program_%d_out.tmp 2>program_%d_err.tmp", ALB_PROGRAM, arguments,
                              (int)getpid(), (int)getpid());
     free(output);
     free(complaint);

@@ -3,6 +3,8 @@
 #include "base/random.h"
 #include "check.h"
 #include "well_formed.h"
+#include <stdio.h>
+#include <string.h>
 
 static void ticks_are_round_and_inside(void **state)
 {
@@ -116,6 +118,31 @@ static void bar_below_zero_runs_out_of_a_logarithmic_frame(void **state)
     free(svg);
 }
 
+// Twice the palette: every line of the legend is drawn in its own way.
+static void many_curves_stay_distinct(void **state)
+{
+    (void)state;
+    enum { CURVES = 14 };
+    const double x[] = {1, 2};
+    alb_curve curves[CURVES];
+    for (int c = 0; c < CURVES; c++)
+        curves[c] =
+            (alb_curve){.label = "one", .x = x, .y = x, .count = 2, .mark = c % 2 ? ALB_MARK_DASHES : ALB_MARK_LINE};
+    const alb_panel panel = {.curves = curves, .curve_count = CURVES, .height = 1};
+    alb_text svg = {0};
+    char styles[CURVES][96];
+    int found = 0;
+    alb_plot_add(&svg, &panel, 1, 600, 400);
+    for (const char *at = svg.bytes; (at = strstr(at, "h22\" stroke-width")); at++, found++) {
+        assert_true(found < CURVES);
+        snprintf(styles[found], sizeof styles[found], "%.*s", (int)strcspn(at, ">"), at);
+        for (int before = 0; before < found; before++)
+            assert_string_not_equal(styles[before], styles[found]);
+    }
+    assert_int_equal(found, CURVES);
+    alb_text_free(&svg);
+}
+
 static void texts_are_escaped(void **state)
 {
     (void)state;
@@ -177,6 +204,7 @@ int main(void)
         cmocka_unit_test(points_and_bars_stand_where_they_should),
         cmocka_unit_test(hostile_numbers_leave_no_trace),
         cmocka_unit_test(bar_below_zero_runs_out_of_a_logarithmic_frame),
+        cmocka_unit_test(many_curves_stay_distinct),
         cmocka_unit_test(texts_are_escaped),
         cmocka_unit_test(panels_share_an_axis),
         cmocka_unit_test(written_file_is_the_text),

@@ -63,6 +63,8 @@ static void outputs_in_the_way(void **state)
     check_run("render hostile/scene.json -o hostile/old.exr --png /nowhere/a.png", ALB_ACCESS, "/nowhere");
     check_run("render hostile/scene.json -o hostile/old.exr --mesh hostile/old.exr", ALB_USAGE, "two files");
     check_run("render hostile/scene.json -o hostile/scene.json", ALB_USAGE, "two files");
+    check_run("render hostile/scene.json -o hostile/./scene.json", ALB_USAGE, "two files");
+    check_run("render hostile/scene.json -o hostile/new.exr --mesh hostile/../hostile/new.exr", ALB_USAGE, "two files");
     struct stat status;
     assert_true(!stat("hostile/pipe", &status) && S_ISFIFO(status.st_mode));
     char *old = slurp("hostile/old.exr");
@@ -108,7 +110,7 @@ static void files_that_cannot_grow(void **state)
 {
     (void)state;
     save_text("hostile/full.exr", "old");
-    const int status = shell("(trap '' XFSZ; ulimit -f 1; exec timeout 60 '%s' render hostile/scene.json -o "
+    const int status = shell("(trap '' XFSZ; ulimit -f 1; exec timeout 600 '%s' render hostile/scene.json -o "
                              "hostile/full.exr --mesh hostile/full.ply 2>/dev/null >/dev/null)",
                              ALB_PROGRAM);
     assert_int_equal(WEXITSTATUS(status), ALB_ACCESS);
@@ -174,7 +176,7 @@ static void results_that_do_not_fit(void **state)
     assert_int_equal(run("fit --table hostile/profile.csv --side reflection -o hostile/whole --json") % ALB_UNDECIDED,
                      0);
     assert_int_equal(shell("cp -r hostile/whole hostile/before"), 0);
-    const int status = shell("(trap '' XFSZ; ulimit -f 16; exec timeout 60 '%s' fit --table hostile/other.csv --side "
+    const int status = shell("(trap '' XFSZ; ulimit -f 16; exec timeout 600 '%s' fit --table hostile/other.csv --side "
                              "reflection -o hostile/whole 2>/dev/null >/dev/null)",
                              ALB_PROGRAM);
     assert_int_equal(WEXITSTATUS(status), ALB_ACCESS);
@@ -237,8 +239,8 @@ static void materials_that_lie(void **state)
     }
 }
 
-// A picture of 64 x 64: a spot, or a line, and beside it the variance that it is said to have.
-static void save_lit(const char *path, bool line, float variance)
+// A picture of 64 x 64: a spot at (centre, centre), or a line, and beside it the variance that it is said to have.
+static void save_lit(const char *path, bool line, double centre, double decay, float variance)
 {
     alb_error error = {0};
     alb_image image = {0};
@@ -246,7 +248,7 @@ static void save_lit(const char *path, bool line, float variance)
     for (int y = 0; y < 64; y++)
         for (int x = 0; x < 64; x++) {
             float *pixel = alb_image_at(&image, x, y);
-            pixel[0] = (float)exp(-0.5 * (line ? abs(x - 32) : hypot(x - 32, y - 32)));
+            pixel[0] = (float)exp(-decay * (line ? abs(x - 32) : hypot(x - centre, y - centre)));
             pixel[1] = variance;
         }
     check_ok(alb_exr_write(&image, NULL, path, &error), &error);
@@ -258,12 +260,42 @@ static void pictures_that_lie(void **state)
     (void)state;
     static const float variances[] = {-1, NAN, INFINITY};
     for (int i = 0; i < 3; i++) {
-        save_lit("hostile/lie.exr", false, variances[i]);
+        save_lit("hostile/lie.exr", false, 32, 0.5, variances[i]);
         check_run("fit --image hostile/lie.exr --mm-per-pixel 0.5 -o hostile/f", ALB_BAD_DATA, "no pixel holds");
     }
-    save_lit("hostile/line.exr", true, 1e-8F);
+    save_lit("hostile/line.exr", true, 32, 0.5, 1e-8F);
     assert_int_equal(run("fit --image hostile/line.exr --mm-per-pixel 0.5 -o hostile/f"), ALB_UNDECIDED);
     assert_non_null(strstr(complaint, "the data do not decide"));
+}
+
+// Nine tenths of the light beyond the border: what the rings hold is not whole.
+static void spot_in_a_corner(void **state)
+{
+    (void)state;
+    static const double centres[] = {0, 1, 3};
+    for (int i = 0; i < 3; i++) {
+        save_lit("hostile/corner.exr", false, centres[i], 0.1, 1e-6F);
+        assert_int_equal(run("fit --image hostile/corner.exr --mm-per-pixel 0.5 -o hostile/f"), ALB_UNDECIDED);
+        assert_non_null(strstr(complaint, "of its light lies beyond: bring the spot to the middle"));
+    }
+}
+
+// The peak alone is above the noise, so any decay will do: no sd at all, which is not an sd of 0.
+static void undecided_total(void **state)
+{
+    (void)state;
+    save_text("hostile/peak.csv", "r_mm,value_per_mm2,sd_per_mm2\n1,1,1e-4\n2,0,1e-4\n3,0,1e-4\n4,0,1e-4\n5,0,1e-4\n");
+    assert_int_equal(run("fit --table hostile/peak.csv --side reflection -o hostile/f"), ALB_UNDECIDED);
+    assert_int_equal(shell("'%s' fit --table hostile/peak.csv --side reflection -o hostile/f 2>/dev/null | grep -q "
+                           "'total .*undecided'",
+                           ALB_PROGRAM),
+                     0);
+    assert_int_equal(shell("grep -q '(undecided)' hostile/f/report/fit.html && ! grep -q '± 0[|<]' "
+                           "hostile/f/report/fit.html"),
+                     0);
+    assert_int_equal(shell("tr -d '\\n ' < hostile/f/material.json | grep -q "
+                           "'\"total\":{\"value\":[^,]*,\"sd\":null,.*\"identifiable\":false,\"because\":\"the'"),
+                     0);
 }
 
 int main(void)
@@ -275,6 +307,7 @@ int main(void)
         cmocka_unit_test(tables_at_their_ends),       cmocka_unit_test(scenes_at_their_ends),
         cmocka_unit_test(results_that_do_not_fit),    cmocka_unit_test(exports_of_odd_names),
         cmocka_unit_test(materials_that_lie),         cmocka_unit_test(pictures_that_lie),
+        cmocka_unit_test(spot_in_a_corner),           cmocka_unit_test(undecided_total),
     };
     return cmocka_run_group_tests(tests, make_inputs, remove_inputs);
 }

@@ -1,34 +1,10 @@
 // Energy: whatever the readings, no more leaves than came in.
-#include "base/random.h"
-#include "check.h"
-#include "fit/energy.h"
+#include "one_side.h"
 
-enum { READINGS = 60 };
-
-// One side: a profile seen from 0.1 mm to range_mm with relative noise and a floor.
-static void make_side(alb_fitting *fitting, alb_side side, const alb_profile *truth, double range_mm, double noise,
-                      double floor, alb_random *random)
+// 60 rings out to range_mm.
+static one_side seen(double range_mm, double noise)
 {
-    alb_error error = {0};
-    alb_measurement *measurement = &fitting->sides[side][0];
-    alb_readings *readings = &measurement->readings;
-    check_ok(alb_readings_create(readings, READINGS, &error), &error);
-    const double step = range_mm / READINGS;
-    for (int i = 0; i < READINGS; i++) {
-        const double r = step * (i + 0.5), value = alb_profile_value(truth, r);
-        readings->r_mm[i] = r;
-        readings->sd[i] = noise * hypot(value, floor * alb_profile_value(truth, 0));
-        readings->value[i] = value + readings->sd[i] * alb_random_normal(random);
-        readings->area_mm2[i] = 2 * M_PI * r * step;
-    }
-    readings->outer_mm = range_mm;
-    check_ok(alb_operator_identity(&measurement->forward, readings, &error), &error);
-}
-
-static void start(alb_fitting *fitting, bool absolute)
-{
-    *fitting = (alb_fitting){.material.channels = 1, .absolute = absolute};
-    snprintf(fitting->material.channel_names[0], sizeof fitting->material.channel_names[0], "Y");
+    return (one_side){.readings = 60, .range_mm = range_mm, .noise = noise, .floor = 0.01};
 }
 
 // The row sum of a matrix of square cells of side `cell_mm` on a plane: the mean of S over each, and the disc of the
@@ -63,14 +39,14 @@ static void row_sums_of_noisy_fits(void **state)
         alb_error error = {0};
         alb_random random = alb_random_at(41, 0, t);
         static _Thread_local alb_fitting fitting;
-        start(&fitting, true);
+        one_side_start(&fitting, true);
         const double albedo = 1 - 0.2 * pow(alb_random_uniform(&random), 2), split = alb_random_uniform(&random);
         const alb_profile r = random_profile(&random, albedo * split),
                           s = random_profile(&random, albedo * (1 - split));
         const double noise = 0.003 * pow(100, alb_random_uniform(&random)),
                      range = 2 + 20 * alb_random_uniform(&random);
-        make_side(&fitting, ALB_REFLECTION, &r, range, noise, 0.01, &random);
-        make_side(&fitting, ALB_TRANSMISSION, &s, range, noise, 0.01, &random);
+        one_side_read(&fitting, ALB_REFLECTION, &r, seen(range, noise), &random);
+        one_side_read(&fitting, ALB_TRANSMISSION, &s, seen(range, noise), &random);
         if (alb_fitting_run(&fitting, &error)) {
             double sum = 0, outward = 0;
             for (int side = 0; side < ALB_SIDES; side++) {
@@ -107,10 +83,10 @@ static void vanishing_term(void **state)
             alb_error error = {0};
             alb_random random = alb_random_at(42, (unsigned)k, t);
             static alb_fitting fitting;
-            start(&fitting, true);
+            one_side_start(&fitting, true);
             const double faint = pow(10, -1 - k), scale = 0.1;
             const alb_profile truth = {ALB_FORM_TWO_EXPONENTIALS, {scale * faint, 0.3, scale, 1.2}};
-            make_side(&fitting, ALB_REFLECTION, &truth, 12, 0.01, 0.01, &random);
+            one_side_read(&fitting, ALB_REFLECTION, &truth, seen(12, 0.01), &random);
             check_ok(alb_fitting_run(&fitting, &error), &error);
             const alb_fitted *fitted = &fitting.material.fitted[ALB_REFLECTION][0];
             assert_true(fitted->total <= 1);
@@ -136,12 +112,12 @@ static void R_T_above_1(void **state)
         alb_error error = {0};
         alb_random random = alb_random_at(43, 0, (unsigned)k);
         static alb_fitting fitting;
-        start(&fitting, true);
+        one_side_start(&fitting, true);
         const double r = 0.7 * totals[k], s = 0.3 * totals[k];
         const alb_profile reflection = {ALB_FORM_EXPONENTIAL, {r * 1 / (2 * M_PI), 1}},
                           transmission = {ALB_FORM_EXPONENTIAL, {s * 0.25 / (2 * M_PI), 0.5}};
-        make_side(&fitting, ALB_REFLECTION, &reflection, 15, 0.01, 0.01, &random);
-        make_side(&fitting, ALB_TRANSMISSION, &transmission, 25, 0.01, 0.01, &random);
+        one_side_read(&fitting, ALB_REFLECTION, &reflection, seen(15, 0.01), &random);
+        one_side_read(&fitting, ALB_TRANSMISSION, &transmission, seen(25, 0.01), &random);
         fitting.sides[0][0].common.flux = fitting.sides[1][0].common.flux = 0.01;
         check_ok(alb_fitting_run(&fitting, &error), &error);
         const alb_outcome *outcome = &fitting.sides[0][0].outcome;
@@ -164,9 +140,9 @@ static void other_units_are_left(void **state)
     alb_error error = {0};
     alb_random random = alb_random_at(44, 0, 0);
     static alb_fitting fitting;
-    start(&fitting, false);
+    one_side_start(&fitting, false);
     const alb_profile bright = {ALB_FORM_EXPONENTIAL, {1000, 1}};
-    make_side(&fitting, ALB_REFLECTION, &bright, 15, 0.01, 0.01, &random);
+    one_side_read(&fitting, ALB_REFLECTION, &bright, seen(15, 0.01), &random);
     check_ok(alb_fitting_run(&fitting, &error), &error);
     assert_true(fitting.material.fitted[0][0].identifiable);
     check_relative(fitting.material.fitted[0][0].total, 2000 * M_PI, 0.01);

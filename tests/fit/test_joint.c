@@ -3,6 +3,7 @@
 #include "base/statistics.h"
 #include "check.h"
 #include "slab_rings.h"
+#include <string.h>
 
 enum { TRIALS = 16, MARBLE = 0, MILK = 1, ISOTROPIC = 2, WAX = 2, SLABS = 3 };
 static const double noise = 0.01, scale_sd = 0.02;
@@ -142,6 +143,60 @@ static void anisotropy_is_found(void **state)
     alb_readings_free(&readings[1]);
 }
 
+// Readings that scatter by 10 % more than their sd say: seen as such, and the sd that are said hold (4 of them).
+static void scatter_beyond_the_noise_widens(void **state)
+{
+    (void)state;
+    const slab_rings *rings = &slabs[WAX];
+    const alb_joint_known known = {rings->slab.thickness_mm, rings->slab.refractive_index, 0.5, 0, scale_sd, 0};
+    const double scatter = 0.1;
+    alb_error error = {0};
+    for (uint64_t trial = 0; trial < 4; trial++) {
+        alb_readings readings[ALB_SIDES] = {{0}};
+        alb_random random = alb_random_at(78, 0, trial);
+        alb_joint joint;
+        check_ok(slab_rings_photograph(readings, rings, 0.003, 1, trial, &error), &error);
+        for (int side = 0; side < ALB_SIDES; side++)
+            for (int k = 0; k < readings[side].count; k++)
+                readings[side].value[k] *= 1 + scatter * alb_random_normal(&random);
+        const alb_joint_side both[ALB_SIDES] = {{&readings[0], &rings->forward[0]}, {&readings[1], &rings->forward[1]}};
+        check_ok(alb_joint_fit(&joint, both, &known, &error), &error);
+        assert_string_equal(joint.undecided, "");
+        // chi-square's own scatter, 4 sd
+        check_near(joint.discrepancy_relative, scatter, 4 * scatter / sqrt(2 * joint.degrees_of_freedom));
+        for (int p = 0; p < ALB_JOINT_ANISOTROPY; p++) {
+            check_below(fabs(log(found(&joint, p) / truth(rings, p))), 4 * joint.relative_sd[p]);
+            check_below(joint.relative_sd[p], 0.3);
+        }
+        alb_readings_free(&readings[0]);
+        alb_readings_free(&readings[1]);
+    }
+}
+
+// A slab said to be half as thick again, and a transmission of twice its scale: no answer, and the figures of why.
+static void another_slab_is_refused(void **state)
+{
+    (void)state;
+    const slab_rings *rings = &slabs[WAX];
+    alb_error error = {0};
+    for (int wrong = 0; wrong < 2; wrong++) {
+        alb_joint_known known = {rings->slab.thickness_mm, rings->slab.refractive_index, 0.5, 0.5, scale_sd, 0};
+        alb_readings readings[ALB_SIDES] = {{0}};
+        alb_joint joint;
+        check_ok(slab_rings_photograph(readings, rings, 0.003, 1, 1, &error), &error);
+        known.thickness_mm *= wrong == 0 ? 1.5 : 1;
+        for (int k = 0; k < readings[ALB_TRANSMISSION].count; k++)
+            readings[ALB_TRANSMISSION].value[k] *= wrong == 1 ? 2 : 1;
+        const alb_joint_side both[ALB_SIDES] = {{&readings[0], &rings->forward[0]}, {&readings[1], &rings->forward[1]}};
+        check_ok(alb_joint_fit(&joint, both, &known, &error), &error);
+        print_message("%s\n", joint.undecided);
+        assert_non_null(strstr(joint.undecided, "neighbours miss them alike"));
+        assert_non_null(strstr(joint.undecided, "chi-square"));
+        alb_readings_free(&readings[0]);
+        alb_readings_free(&readings[1]);
+    }
+}
+
 static void any_number_of_threads_gives_the_same_bytes(void **state)
 {
     (void)state;
@@ -190,6 +245,8 @@ int main(void)
                                        cmocka_unit_test(scale_error),
                                        cmocka_unit_test(reflection_alone_knows_less),
                                        cmocka_unit_test(anisotropy_is_found),
+                                       cmocka_unit_test(scatter_beyond_the_noise_widens),
+                                       cmocka_unit_test(another_slab_is_refused),
                                        cmocka_unit_test(any_number_of_threads_gives_the_same_bytes),
                                        cmocka_unit_test(refuses_what_does_not_decide)};
     return cmocka_run_group_tests(tests, prepare, drop);

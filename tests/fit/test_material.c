@@ -129,6 +129,12 @@ static void damaged(void **state)
     check_replaced("\"channels\"", "\"colour\": 1, \"channels\"", "unknown key");
     check_replaced("\"channels\"", "\"finish\": \"shiny\", \"channels\"", "found \"shiny\"");
     check_replaced("\"format\": 1", "\"format\": 2", "format");
+    check_replaced("\"interval_95\": [", "\"interval_95\": [7, ", "3 ends");
+    check_replaced("\"cramer_rao_sd\": ", "\"cramer_rao_sd\": true, \"because\": ", "cramer_rao_sd");
+    check_replaced("\"condition\": ", "\"condition\": \"good\", \"left_out_to_mm\": ", "condition");
+    check_replaced("\"tried\": [", "\"tried\": [{\"form\": 3}, ", "form");
+    check_replaced("\"tried\": [", "\"tried\": [{\"shape\": 3}, ", "unknown key");
+    check_replaced("\"errors_from\": ", "\"errors_from\": 1, \"offset_instead\": ", "errors_from");
     check_replaced("\"covariance\": [", "\"covariance\": [[1, 1, 1, 1], ", "5 rows for 4");
     alb_fitting_free(fitting);
     free(fitting);

@@ -1,7 +1,5 @@
 // A constant in the readings: taken off where they tell, said where they do not.
-#include "base/random.h"
-#include "check.h"
-#include "fit/energy.h"
+#include "one_side.h"
 
 enum { READINGS = 100, TRIALS = 20 };
 
@@ -9,21 +7,8 @@ static void run(alb_fitting *fitting, const alb_profile *truth, double offset, d
                 double range_mm, alb_random *random)
 {
     alb_error error = {0};
-    *fitting = (alb_fitting){.material.channels = 1, .absolute = true};
-    snprintf(fitting->material.channel_names[0], sizeof fitting->material.channel_names[0], "Y");
-    alb_measurement *measurement = &fitting->sides[ALB_REFLECTION][0];
-    alb_readings *readings = &measurement->readings;
-    check_ok(alb_readings_create(readings, READINGS, &error), &error);
-    const double step = range_mm / READINGS;
-    for (int i = 0; i < READINGS; i++) {
-        const double r = step * (i + 0.5), value = alb_profile_value(truth, r);
-        readings->r_mm[i] = r;
-        readings->sd[i] = noise * hypot(value, floor * alb_profile_value(truth, 0));
-        readings->value[i] = value + offset + readings->sd[i] * alb_random_normal(random);
-        readings->area_mm2[i] = 2 * M_PI * r * step;
-    }
-    readings->outer_mm = range_mm;
-    check_ok(alb_operator_identity(&measurement->forward, readings, &error), &error);
+    one_side_start(fitting, true);
+    one_side_read(fitting, ALB_REFLECTION, truth, (one_side){READINGS, range_mm, noise, floor, offset}, random);
     check_ok(alb_fitting_run(fitting, &error), &error);
 }
 

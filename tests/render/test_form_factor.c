@@ -30,12 +30,14 @@ static void world_free(world *w)
 static double share(const world *w, const alb_form_factors *f, alb_vector from, alb_vector to)
 {
     double area = 0, sum = 0;
+    uint32_t hits[256];
     for (size_t p = 0; p < w->patches.count; p++) {
         if (alb_dot(w->patches.normals[p], from) < 0.9)
             continue;
         area += w->patches.areas_mm2[p];
+        alb_form_factors_row(hits, f, p);
         for (int q = 0; q < f->rays; q++) {
-            const uint32_t hit = f->hits[p * (size_t)f->rays + (size_t)q];
+            const uint32_t hit = hits[q];
             if (hit < w->patches.count && alb_dot(w->patches.normals[hit], to) > 0.9)
                 sum += w->patches.areas_mm2[p] / f->rays;
         }
@@ -129,9 +131,12 @@ static void sky_and_backs_are_told_apart(void **state)
     check_ok(alb_tracer_create(&w.tracer, &w.mesh, &error), &error);
     check_ok(alb_form_factors_create(&f, &w.patches, &w.tracer, 64, 3, ALB_SAMPLING_LATTICE, &error), &error);
     assert_true(f.back_rays > 0);
-    for (size_t q = 0; q < 64 * w.patches.count;
-         q++) // nobody sees a front: the room's face inwards, the cube's turn away
-        assert_true(f.hits[q] >= w.patches.count || w.mesh.faces[q / 64][0] >= w.mesh.faces[108][0] - 8);
+    for (size_t p = 0; p < w.patches.count; p++) { // nobody sees a front: the room's face inwards, the cube's turn away
+        uint32_t hits[64];
+        alb_form_factors_row(hits, &f, p);
+        for (size_t q = 0; q < 64; q++)
+            assert_true(hits[q] >= w.patches.count || w.mesh.faces[p][0] >= w.mesh.faces[108][0] - 8);
+    }
     alb_form_factors_free(&f);
     world_free(&w);
 }
@@ -148,7 +153,7 @@ static void threads_do_not_matter(void **state)
         omp_set_num_threads(k + 1);
         check_ok(alb_form_factors_create(&f[k], &w.patches, &w.tracer, 64, 3, ALB_SAMPLING_LATTICE, &error), &error);
     }
-    assert_memory_equal(f[0].hits, f[1].hits, w.patches.count * 64 * sizeof(uint32_t));
+    assert_memory_equal(f[0].rows.hits, f[1].rows.hits, w.patches.count * 64 * sizeof(uint16_t));
     alb_form_factors_free(&f[0]);
     alb_form_factors_free(&f[1]);
     world_free(&w);

@@ -9,7 +9,7 @@
 
 static void scene_of(alb_scene *scene, alb_mesh *mesh, const alb_surface *surfaces, size_t count, int rays)
 {
-    *scene = (alb_scene){.rays_per_patch = rays, .residual = 1e-9, .seed = 5, .surface_count = count};
+    *scene = (alb_scene){.rays_per_patch = rays, .residual = 1e-6, .seed = 5, .surface_count = count};
     scene->mesh = *mesh;
     *mesh = (alb_mesh){0};
     scene->surfaces = calloc(count, sizeof *surfaces);
@@ -28,93 +28,19 @@ static void closed_sphere_is_exact(void **state)
     const alb_surface wall = {.name = "wall", .reflectance = {0.1, 0.9, 0.99}, .exitance = {1, 2, 3}};
     check_ok(alb_shape_sphere(&mesh, &sphere, &error), &error);
     scene_of(&scene, &mesh, &wall, 1, 64);
+    scene.residual = 5e-5; // products round to 1e-7, which 1 / (1 - reflectance) multiplies
     check_ok(alb_solution_create(&solution, &scene, &error), &error);
     assert_int_equal(solution.factors.sky_rays, 0);
     for (size_t p = 0; p < solution.patches.count; p++)
         for (int c = 0; c < 3; c++)
             check_relative(solution.radiosity[p][c], wall.exitance[c] / (1 - wall.reflectance[c]),
-                           1e-7); // residual / (1 - rho)
+                           5e-5 / (1 - wall.reflectance[c]));
     alb_solution_free(&solution);
     alb_scene_free(&scene);
 }
 
-// A matrix S' of its own choice as the sparse rows of an alb_scatter.
-static void random_scatter(alb_scatter *scatter, size_t n, uint64_t seed)
-{
-    *scatter = (alb_scatter){.patch_count = n};
-    scatter->local = calloc(n, sizeof *scatter->local);
-    scatter->row_starts = calloc(n + 1, sizeof *scatter->row_starts);
-    scatter->sources = calloc(n * n, sizeof *scatter->sources);
-    scatter->weights = calloc(n * n, sizeof *scatter->weights);
-    for (size_t j = 0; j < n; j++) {
-        double row[3] = {0};
-        scatter->row_starts[j + 1] = (j + 1) * n;
-        for (size_t i = 0; i < n; i++) {
-            alb_random random = alb_random_at(seed, j, i);
-            scatter->sources[j * n + i] = (uint32_t)i;
-            for (int c = 0; c < 3; c++) {
-                const double u = alb_random_uniform(&random);
-                scatter->weights[j * n + i][c] = (float)(u * u * u * u);
-                row[c] += u * u * u * u;
-            }
-        }
-        alb_random random = alb_random_at(seed, n + j, 0);
-        for (int c = 0; c < 3; c++) { // row sums from 0.3 to 0.98
-            const float scale = (float)((0.3 + 0.68 * alb_random_uniform(&random)) / row[c]);
-            for (size_t i = 0; i < n; i++)
-                scatter->weights[j * n + i][c] *= scale;
-        }
-    }
-}
-
-// On a spherical enclosure F = 1 w^T (w the shares of area), so that for any S' and E (Sherman-Morrison)
-//     B = S'E + S'1 (w^T S'E) / (1 - w^T S'1)
-// F is laid out with counts of rays that are exactly the areas' shares: what is tested is the solver, S' and the areas.
-static void any_scattering_on_a_sphere_is_exact(void **state)
-{
-    (void)state;
-    enum { N = 60, RAYS = 997 };
-    alb_error error = {0};
-    alb_scatter scatter;
-    double areas[N] = {0}, ones[N][3], light[N][3], dark[N][3] = {{0}}, first[N][3], rows[N][3], found[N][3];
-    alb_form_factors f = {.patch_count = N, .rays = RAYS, .hits = calloc(N * RAYS, sizeof(uint32_t))};
-    random_scatter(&scatter, N, 21);
-    for (int q = 0; q < RAYS; q++) {
-        alb_random random = alb_random_at(22, 0, (uint64_t)q);
-        const double u = alb_random_uniform(&random);
-        const uint32_t hit = (uint32_t)(N * u * u); // unequal: from 1 to over 100 rays
-        areas[hit] += 1;
-        for (size_t p = 0; p < N; p++)
-            f.hits[p * RAYS + (size_t)q] = hit;
-    }
-    for (size_t p = 0; p < N; p++) {
-        alb_random random = alb_random_at(23, 0, p);
-        for (int c = 0; c < 3; c++) {
-            ones[p][c] = 1;
-            light[p][c] = alb_random_uniform(&random);
-        }
-    }
-    alb_radiosity_report report;
-    check_ok(alb_radiosity_solve(found, &report, (const double(*)[3])light, (const double(*)[3])dark, &scatter, &f,
-                                 areas, 1e-12, &error),
-             &error);
-    assert_true(report.iterations < 12); // F has rank one: the space is exhausted after two products
-    alb_scatter_apply(first, &scatter, (const double(*)[3])light);
-    alb_scatter_apply(rows, &scatter, (const double(*)[3])ones);
-    for (int c = 0; c < 3; c++) {
-        double lit = 0, kept = 0;
-        for (size_t p = 0; p < N; p++) {
-            lit += areas[p] / RAYS * first[p][c];
-            kept += areas[p] / RAYS * rows[p][c];
-        }
-        for (size_t p = 0; p < N; p++)
-            check_relative(found[p][c], first[p][c] + rows[p][c] * lit / (1 - kept), 1e-9);
-    }
-    free(f.hits);
-    alb_scatter_free(&scatter);
-}
-
-// The same with rays and a profile: a translucent shell lit by a beam. Each patch's own rays are random, so the mean of
+// On a spherical enclosure B = S'E + S'1 (w^T S'E) / (1 - w^T S'1), w the shares of area (test_solver.c); here with
+// rays and a profile: a translucent shell lit by a beam. Each patch's own rays are random, so the mean of
 // B is checked against the closed form with the sampling error found over seeds; the sphere's facets cost what a finer
 // one shows.
 static void translucent_sphere_agrees(void **state)
@@ -270,7 +196,7 @@ static void white_furnace(void **state)
     scene.lights[0] = (alb_light){.kind = ALB_LIGHT_ENVIRONMENT, .radiance = {1, 1, 1}};
     check_ok(alb_solution_create(&s, &scene, &error), &error);
     for (size_t p = 0; p < s.patches.count; p++)
-        check_relative(s.radiosity[p][p % 3], M_PI, 1e-7); // the residual over the smallest share of sky
+        check_relative(s.radiosity[p][p % 3], M_PI, 1e-5); // the residual over the smallest share of sky
     alb_solution_free(&s);
     alb_scene_free(&scene);
 }
@@ -393,7 +319,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closed_sphere_is_exact),
-        cmocka_unit_test(any_scattering_on_a_sphere_is_exact),
         cmocka_unit_test(translucent_sphere_agrees),
         cmocka_unit_test(energy_is_conserved),
         cmocka_unit_test(refuses_scattering_that_creates_light),

@@ -1,0 +1,112 @@
+// Ray q of R of a patch with normal n, tangents t, b and one uniform pair s1, s2 a patch (Cranley-Patterson rotation):
+//     u = frac((q + 1/2)/R + s1),  v = frac(0.6180339887498949 q + s2)        Fibonacci (golden-ratio) lattice
+//     d = sqrt(1-u) n + sqrt(u) (cos 2 pi v t + sin 2 pi v b)                 cosine-weighted hemisphere
+// The origin is a uniform point of the triangle, fresh for each ray. Random numbers are a function of (seed, patch, q).
+//
+// A ray that leaves the scene between rays that do not is cast again, turned by 1e-5: what then meets something had
+// slipped through a crack of rounding. An opening is wider than that and stays the sky.
+//
+// Where it stops being true: openings narrower than 1e-5 of their distance are closed; patches large against the scene
+// would need their origins stratified too.
+#include "render/form_factor_cast.h"
+#include "base/random.h"
+
+static const double crack = 1e-5;   // radians
+static const double few = 1.0 / 16; // of a patch's rays: more that miss are an opening
+
+static double fraction(double x) { return x - floor(x); }
+
+// What the rays of one patch share.
+typedef struct fan {
+    alb_vector n, t, b;
+    double s1, s2;
+    int rays;
+} fan;
+
+static fan fan_of(const alb_ray_pattern *pattern, const alb_patches *patches, size_t patch)
+{
+    fan f = {.n = patches->normals[patch], .rays = pattern->rays};
+    alb_random random = alb_random_at(pattern->seed, 2 * patch, 0);
+    alb_tangents(&f.t, &f.b, f.n);
+    f.s1 = alb_random_uniform(&random);
+    f.s2 = alb_random_uniform(&random);
+    return f;
+}
+
+static alb_vector direction_of(const fan *f, const alb_ray_pattern *pattern, size_t patch, int q)
+{
+    double u, v;
+    if (pattern->sampling == ALB_SAMPLING_LATTICE) {
+        u = fraction((q + 0.5) / f->rays + f->s1);
+        v = fraction(0.6180339887498949 * q + f->s2);
+    } else {
+        alb_random random = alb_random_at(pattern->seed, 2 * patch, (uint64_t)q);
+        u = alb_random_uniform(&random);
+        v = alb_random_uniform(&random);
+    }
+    const double side = sqrt(u), angle = 2 * M_PI * v;
+    const alb_vector in_plane = alb_add(alb_times(cos(angle), f->t), alb_times(sin(angle), f->b));
+    return alb_add(alb_times(sqrt(1 - u), f->n), alb_times(side, in_plane));
+}
+
+alb_vector alb_ray_direction(const alb_ray_pattern *pattern, const alb_patches *patches, size_t patch, int q)
+{
+    const fan f = fan_of(pattern, patches, patch);
+    return direction_of(&f, pattern, patch, q);
+}
+
+static uint32_t meet(const alb_patches *patches, const alb_tracer *tracer, alb_vector origin, alb_vector direction)
+{
+    alb_hit hit;
+    if (!alb_tracer_closest(&hit, tracer, origin, direction))
+        return (uint32_t)patches->count;
+    return hit.front ? hit.face : (uint32_t)patches->count + 1;
+}
+
+// The ray turned a little to four sides: what it meets, or the sky if it is there every time.
+static uint32_t meet_turned(const alb_patches *patches, const alb_tracer *tracer, alb_vector origin, alb_vector d)
+{
+    alb_vector t, b;
+    uint32_t found = (uint32_t)patches->count;
+    alb_tangents(&t, &b, d);
+    for (int k = 0; k < 4 && found == patches->count; k++) {
+        const alb_vector turn = alb_times(k & 1 ? crack : -crack, k & 2 ? b : t);
+        found = meet(patches, tracer, origin, alb_unit(alb_add(d, turn)));
+    }
+    return found;
+}
+
+static alb_vector origin_of(alb_random *random, const alb_patches *patches, size_t patch)
+{
+    const double u = alb_random_uniform(random), v = alb_random_uniform(random);
+    return alb_patch_point(patches, patch, u, v);
+}
+
+size_t alb_rays_cast(uint32_t *hits, const alb_ray_pattern *pattern, const alb_patches *patches,
+                     const alb_tracer *tracer, size_t patch)
+{
+    const fan f = fan_of(pattern, patches, patch);
+    size_t missed = 0, slipped = 0;
+    if (alb_patch_buried(patches, patch)) {
+        for (int q = 0; q < f.rays; q++)
+            hits[q] = (uint32_t)patches->count + 1;
+        return 0;
+    }
+    alb_random random = alb_random_at(pattern->seed, 2 * patch + 1, 0);
+    for (int q = 0; q < f.rays; q++) {
+        const alb_vector origin = origin_of(&random, patches, patch);
+        hits[q] = meet(patches, tracer, origin, direction_of(&f, pattern, patch, q));
+        missed += hits[q] == patches->count;
+    }
+    if (missed == 0 || (double)missed > few * f.rays)
+        return 0;
+    random = alb_random_at(pattern->seed, 2 * patch + 1, 0);
+    for (int q = 0; q < f.rays; q++) {
+        const alb_vector origin = origin_of(&random, patches, patch);
+        if (hits[q] == patches->count) {
+            hits[q] = meet_turned(patches, tracer, origin, direction_of(&f, pattern, patch, q));
+            slipped += hits[q] != patches->count;
+        }
+    }
+    return slipped;
+}
