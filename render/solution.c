@@ -130,8 +130,12 @@ static void add_lamps(alb_solution *s, double sign)
 // Accounts of a solution: what it may lack, and where the light goes.
 static bool take_stock(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
+    double sky[3] = {0};
+    for (size_t i = 0; i < scene->light_count; i++)
+        for (int c = 0; c < 3 && scene->lights[i].kind == ALB_LIGHT_ENVIRONMENT; c++)
+            sky[c] += M_PI * scene->lights[i].radiance[c];
     s->bound = alb_radiosity_bound(&s->equations, &s->report, (const double(*)[3])s->radiosity);
-    return alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, NULL, error) &&
+    return alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, sky, error) &&
            take_irradiance(s, scene, error);
 }
 
