@@ -108,6 +108,11 @@ static void warn(const alb_scene *scene, const alb_solution *s)
     size_t open = 0, bent = 0;
     if (scene->mesh.dropped)
         fprintf(stderr, "render: %zu faces left out: no area, or there twice\n", scene->mesh.dropped);
+    if (scene->mesh.turned)
+        fprintf(stderr, "render: %zu faces turned over: they faced against their neighbours\n", scene->mesh.turned);
+    if (s->patches.culled)
+        fprintf(stderr, "render: %zu patches lie inside other bodies or walls, in whole or in part: left out there\n",
+                s->patches.culled);
     if (s->factors.back_rays)
         fprintf(stderr,
                 "render: %.2f %% of the rays between patches meet the back of a patch, which is black; is a mesh open "
@@ -140,6 +145,8 @@ static bool print_json(const alb_scene *scene, const alb_solution *s, double vie
     alb_json_begin(&json, NULL);
     alb_json_integer(&json, "patches", (long)s->patches.count);
     alb_json_integer(&json, "dropped_faces", (long)scene->mesh.dropped);
+    alb_json_integer(&json, "turned_faces", (long)scene->mesh.turned);
+    alb_json_integer(&json, "culled_patches", (long)s->patches.culled);
     alb_json_integer(&json, "rays_per_patch", s->factors.rays);
     alb_json_integer(&json, "iterations", s->report.iterations);
     alb_json_number(&json, "residual", s->report.residual);

@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "render/lamp.h"
+#include "render/patch_cull.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -197,7 +198,7 @@ static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, 
     switch (stage) {
     case ALB_STAGE_TRACER:
         if (!alb_patches_create(&s->patches, &scene->mesh, error) ||
-            !alb_tracer_create(&s->tracer, &scene->mesh, error))
+            !alb_tracer_create(&s->tracer, &scene->mesh, error) || !alb_patches_cull(&s->patches, &s->tracer, error))
             return false;
         s->bytes[stage] = (size_t)s->tracer.bytes;
         return true;
