@@ -108,6 +108,11 @@ static void warn(const alb_scene *scene, const alb_solution *s)
     size_t open = 0, bent = 0;
     if (scene->mesh.dropped)
         fprintf(stderr, "render: %zu faces left out: no area, or there twice\n", scene->mesh.dropped);
+    if (scene->mesh.turned)
+        fprintf(stderr, "render: %zu faces turned over: they faced against their neighbours\n", scene->mesh.turned);
+    if (s->patches.culled)
+        fprintf(stderr, "render: %zu patches lie inside other bodies or walls, in whole or in part: left out there\n",
+                s->patches.culled);
     if (s->factors.back_rays)
         fprintf(stderr,
                 "render: %.2f %% of the rays between patches meet the back of a patch, which is black; is a mesh open "
@@ -140,9 +145,13 @@ static bool print_json(const alb_scene *scene, const alb_solution *s, double vie
     alb_json_begin(&json, NULL);
     alb_json_integer(&json, "patches", (long)s->patches.count);
     alb_json_integer(&json, "dropped_faces", (long)scene->mesh.dropped);
+    alb_json_integer(&json, "turned_faces", (long)scene->mesh.turned);
+    alb_json_integer(&json, "culled_patches", (long)s->patches.culled);
     alb_json_integer(&json, "rays_per_patch", s->factors.rays);
     alb_json_integer(&json, "iterations", s->report.iterations);
     alb_json_number(&json, "residual", s->report.residual);
+    alb_json_number(&json, "radiosity_bound_percent", 100 * s->bound);
+    alb_json_number(&json, "rays_error_percent", s->rays_error_percent);
     alb_json_number(&json, "largest_row_sum", s->row_sum);
     alb_json_number(&json, "largest_column_sum", s->column_sum);
     alb_json_object(&json, "flux");
@@ -173,8 +182,9 @@ static bool report(const outputs *out, const alb_scene *scene, const alb_solutio
         total_s += s->seconds[i];
     if (out->json)
         return print_json(scene, s, view_s, exposure, error);
-    printf("%s: %zu patches, %d products to residual %.1e, largest row sum %.4f, %.1f s\n", out->picture,
-           s->patches.count, s->report.iterations, s->report.residual, s->row_sum, total_s);
+    printf("%s: %zu patches, %d products to residual %.1e, rays' error %.2f %%, largest row sum %.4f, %.1f s\n",
+           out->picture, s->patches.count, s->report.iterations, s->report.residual, s->rays_error_percent, s->row_sum,
+           total_s);
     return true;
 }
 

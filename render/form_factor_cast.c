@@ -87,6 +87,11 @@ size_t alb_rays_cast(uint32_t *hits, const alb_ray_pattern *pattern, const alb_p
 {
     const fan f = fan_of(pattern, patches, patch);
     size_t missed = 0, slipped = 0;
+    if (alb_patch_buried(patches, patch)) {
+        for (int q = 0; q < f.rays; q++)
+            hits[q] = (uint32_t)patches->count + 1;
+        return 0;
+    }
     alb_random random = alb_random_at(pattern->seed, 2 * patch + 1, 0);
     for (int q = 0; q < f.rays; q++) {
         const alb_vector origin = origin_of(&random, patches, patch);

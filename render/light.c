@@ -71,7 +71,7 @@ static double point_share(const alb_light *light, const alb_patches *patches, co
     double sum = 0;
     alb_random random = alb_random_at(seed, stream, patch);
     const double nearest2 = 0.01 * patches->areas_mm2[patch];
-    for (int k = 0; k < POINTS * POINTS; k++) {
+    for (int k = 0; k < POINTS * POINTS && !alb_patch_buried(patches, patch); k++) {
         const double u = (k % POINTS + alb_random_uniform(&random)) / POINTS;
         const double v = ((double)(k / POINTS) + alb_random_uniform(&random)) / POINTS;
         const alb_vector point = alb_patch_point(patches, patch, u, v), to = alb_sub(light->position_mm, point);

@@ -3,6 +3,7 @@
 // A face has no area when |ab x ac| <= 1e-10 of its longest edge squared: below that the normal is rounding noise.
 #include "render/mesh.h"
 #include "base/memory.h"
+#include "render/mesh_orient.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -141,22 +142,23 @@ static uint32_t table_find_or_add(hash_table *table, const uint64_t key[3], uint
     return value;
 }
 
-static void merge_vertices(alb_mesh *mesh, hash_table *table, uint32_t *merged)
+// merged[vertex]: the number of its position. Returns how many there are.
+static size_t number_positions(uint32_t *merged, const alb_mesh *mesh, hash_table *table)
 {
-    size_t kept = 0;
+    size_t count = 0;
     for (size_t i = 0; i < mesh->vertex_count; i++) {
         // + 0.0 makes one of the two zeros
         const double position[3] = {mesh->vertices[i].x + 0.0, mesh->vertices[i].y + 0.0, mesh->vertices[i].z + 0.0};
         uint64_t key[3];
         memcpy(key, position, sizeof key);
-        merged[i] = table_find_or_add(table, key, (uint32_t)kept);
-        if (merged[i] == kept)
-            mesh->vertices[kept++] = mesh->vertices[i];
+        merged[i] = table_find_or_add(table, key, (uint32_t)count);
+        count += merged[i] == count;
     }
-    mesh->vertex_count = kept;
+    return count;
 }
 
-static void merge_faces(alb_mesh *mesh, hash_table *table, const uint32_t *merged)
+// Drops faces that stand there twice; those that stay get merged corners where `weld` says so.
+static void merge_faces(alb_mesh *mesh, hash_table *table, const uint32_t *merged, bool weld)
 {
     size_t kept = 0;
     for (size_t i = 0; i < mesh->face_count; i++) {
@@ -170,13 +172,13 @@ static void merge_faces(alb_mesh *mesh, hash_table *table, const uint32_t *merge
             mesh->dropped++;
             continue;
         }
-        memcpy(mesh->faces[kept], face, sizeof face);
+        memmove(mesh->faces[kept], weld ? face : mesh->faces[i], sizeof face);
         mesh->groups[kept++] = mesh->groups[i];
     }
     mesh->face_count = kept;
 }
 
-bool alb_mesh_weld(alb_mesh *mesh, alb_error *error)
+static bool merge(alb_mesh *mesh, bool weld, alb_error *error)
 {
     bool ok = false;
     hash_table vertices = {0}, faces = {0};
@@ -184,14 +186,25 @@ bool alb_mesh_weld(alb_mesh *mesh, alb_error *error)
     if (!merged || !table_create(&vertices, mesh->vertex_count, error) ||
         !table_create(&faces, mesh->face_count, error))
         goto done;
-    merge_vertices(mesh, &vertices, merged);
-    merge_faces(mesh, &faces, merged);
+    const size_t positions = number_positions(merged, mesh, &vertices);
+    merge_faces(mesh, &faces, merged, weld);
+    for (size_t i = 0, kept = 0; weld && kept < positions; i++) // the first of each position stays, in their order
+        if (merged[i] == kept)
+            mesh->vertices[kept++] = mesh->vertices[i];
+    mesh->vertex_count = weld ? positions : mesh->vertex_count;
     ok = true;
 done:
     free(merged);
     free(vertices.slots);
     free(faces.slots);
     return ok;
+}
+
+bool alb_mesh_weld(alb_mesh *mesh, alb_error *error) { return merge(mesh, true, error); }
+
+bool alb_mesh_repair(alb_mesh *mesh, alb_error *error)
+{
+    return merge(mesh, false, error) && alb_mesh_orient(mesh, error);
 }
 
 // The vertex in the middle of the edge, made once however many faces share it.

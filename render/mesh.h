@@ -15,6 +15,7 @@ typedef struct alb_mesh {
     char (*group_names)[ALB_GROUP_NAME]; // usemtl names; "" for faces without one
     size_t group_count;
     size_t dropped; // faces left out because they have no area or stand there twice
+    size_t turned;  // faces turned over to face the way their neighbours do
 } alb_mesh;
 
 void alb_mesh_free(alb_mesh *mesh);
@@ -28,6 +29,11 @@ bool alb_mesh_append(alb_mesh *mesh, const alb_mesh *other, double scale, alb_ve
 
 // Merges vertices of one position; then drops faces that stand there twice with the same orientation.
 bool alb_mesh_weld(alb_mesh *mesh, alb_error *error);
+// What a whole scene needs before light is traced in it, counted in `dropped` and `turned`: drops faces that stand
+// there twice with the same orientation, by position whoever owns their vertices; then turns over faces that face
+// against most of the area they are joined to, edge to edge. A mesh that is turned inside out as a whole is left as it
+// is (a room looks like that), and so is one that has no two sides. Vertices stay.
+bool alb_mesh_repair(alb_mesh *mesh, alb_error *error);
 // Halves every edge longer than `longest_mm` until none is left. The rule looks at the edge alone, so faces that share
 // an edge stay joined. Refuses more than ALB_FACES_MAX faces before it allocates them.
 bool alb_mesh_subdivide(alb_mesh *mesh, double longest_mm, alb_error *error);

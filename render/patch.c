@@ -18,7 +18,7 @@ bool alb_patches_create(alb_patches *patches, const alb_mesh *mesh, alb_error *e
         alb_patches_free(patches);
         return false;
     }
-    double largest = 0;
+    alb_vector low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t i = 0; i < n; i++) {
         const alb_vector a = corner(mesh, i, 0), b = corner(mesh, i, 1), c = corner(mesh, i, 2);
         const alb_vector cross = alb_cross(alb_sub(b, a), alb_sub(c, a));
@@ -26,11 +26,13 @@ bool alb_patches_create(alb_patches *patches, const alb_mesh *mesh, alb_error *e
         patches->normals[i] = alb_unit(cross);
         patches->areas_mm2[i] = 0.5 * alb_length(cross);
         for (int k = 0; k < 3; k++) {
-            const alb_vector at = alb_sub(corner(mesh, i, k), corner(mesh, 0, 0)); // wherever the mesh stands
-            largest = fmax(largest, fmax(fabs(at.x), fmax(fabs(at.y), fabs(at.z))));
+            const alb_vector at = corner(mesh, i, k);
+            low = (alb_vector){fmin(low.x, at.x), fmin(low.y, at.y), fmin(low.z, at.z)};
+            high = (alb_vector){fmax(high.x, at.x), fmax(high.y, at.y), fmax(high.z, at.z)};
         }
     }
-    patches->offset_mm = 32 * 0x1p-24 * largest;
+    if (n)
+        patches->offset_mm = 16 * 0x1p-24 * fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z));
     return true;
 }
 
@@ -39,6 +41,7 @@ void alb_patches_free(alb_patches *patches)
     free(patches->centroids);
     free(patches->normals);
     free(patches->areas_mm2);
+    free(patches->free_cells);
     *patches = (alb_patches){0};
 }
 
@@ -48,10 +51,40 @@ void alb_patch_triangle(alb_vector triangle[3], const alb_patches *patches, size
         triangle[k] = corner(patches->mesh, patch, k);
 }
 
+// Cell k lies in row r = floor(sqrt k) from corner 0, the 2 r + 1 cells of a row alternately upright and turned over.
+void alb_patch_cell(alb_vector triangle[3], const alb_patches *patches, size_t patch, int cell)
+{
+    alb_vector whole[3];
+    alb_patch_triangle(whole, patches, patch);
+    const int row = (int)sqrt(cell + 0.5), across = cell - row * row, left = across / 2;
+    const int upright[3][2] = {{row, left}, {row + 1, left}, {row + 1, left + 1}};
+    const int over[3][2] = {{row, left}, {row + 1, left + 1}, {row, left + 1}};
+    for (int k = 0; k < 3; k++) {
+        const int *at = across % 2 ? over[k] : upright[k]; // row, place in it
+        const double wc = at[1] / 8.0, wb = (at[0] - at[1]) / 8.0;
+        triangle[k] =
+            alb_add(alb_times(1 - wb - wc, whole[0]), alb_add(alb_times(wb, whole[1]), alb_times(wc, whole[2])));
+    }
+}
+
+// Cell number `place` (0-based) of those that are set.
+static int set_cell(uint64_t cells, int place)
+{
+    while (place-- > 0)
+        cells &= cells - 1;
+    return __builtin_ctzll(cells);
+}
+
 alb_vector alb_patch_point(const alb_patches *patches, size_t patch, double u, double v)
 {
     alb_vector t[3];
-    alb_patch_triangle(t, patches, patch);
+    const uint64_t cells = patches->free_cells ? patches->free_cells[patch] : UINT64_MAX;
+    if (cells && cells != UINT64_MAX) {
+        const double along = u * __builtin_popcountll(cells);
+        alb_patch_cell(t, patches, patch, set_cell(cells, (int)along));
+        u = along - floor(along);
+    } else
+        alb_patch_triangle(t, patches, patch);
     const double root = sqrt(u), wa = 1 - root, wb = root * (1 - v), wc = root * v;
     const alb_vector point = alb_add(alb_times(wa, t[0]), alb_add(alb_times(wb, t[1]), alb_times(wc, t[2])));
     return alb_add(point, alb_times(patches->offset_mm, patches->normals[patch]));

@@ -1,201 +1,133 @@
-// Restarted GMRES (Saad & Schultz 1986) on (I - S'F) B = S'E + M, without a matrix, in the inner product weighted by
-// area, the three channels in step: one product serves all, each has its own small least-squares problem.
-//
-// Convergence: ||S'F||_inf <= (largest row sum of S') (largest row sum of F) < 1 bounds the spectral radius; rows are
-// what ray-cast factors hold exactly. (The bound rho(SF) <= rho(S) rho(F) of Sheng et al. 2014, sec. 3.3, is false in
-// general.) Jacobi iteration would take ~150 products where GMRES takes 10 (albedo 0.99, residual 1e-3).
+// The equations of radiosity as a bounce x -> S'F x, and what is checked before they are solved:
+//     b = S (e + G b) in flux form,  ||S||_1 = largest column sum of S = s,  ||G||_1 = largest row sum of F <= 1
+// so that bounce N carries at most s^N of the light that arrives. The rows of F hold exactly for ray-cast factors, and
+// row sums of S' are its column sums as far as the profile is symmetric: rows below 1 are what a solution needs.
 #include "render/radiosity.h"
 #include "base/memory.h"
 #include <stdlib.h>
 #include <string.h>
 
-enum { RESTART = 20, PRODUCTS_MAX = 500 };
-
-typedef double rgb[3];
-
-typedef struct solver {
-    size_t n;
-    const alb_scatter *scatter;
-    const alb_form_factors *factors;
-    const double *areas;
-    double total_area;
-    rgb *basis[RESTART + 1]; // orthonormal per channel
-    rgb *gathered;
-    double hessenberg[3][RESTART + 1][RESTART], cosine[3][RESTART], sine[3][RESTART], rhs[3][RESTART + 1];
-} solver;
-
-static void dot(double out[3], const solver *s, const rgb *a, const rgb *b)
+bool alb_radiosity_create(alb_radiosity *equations, const alb_patches *patches, const alb_scatter *scatter,
+                          const alb_form_factors *factors, alb_error *error)
 {
-    out[0] = out[1] = out[2] = 0;
-    for (size_t i = 0; i < s->n; i++)
-        for (int c = 0; c < 3; c++)
-            out[c] += s->areas[i] / s->total_area * a[i][c] * b[i][c];
+    *equations = (alb_radiosity){.scatter = scatter, .factors = factors, .areas_mm2 = patches->areas_mm2};
+    size_t longest = 1;
+    for (size_t p = 0; p < patches->count; p++)
+        longest = (size_t)fmax((double)longest, alb_form_factors_rays(factors, p));
+    const bool ok = (equations->row = alb_allocate(longest, sizeof *equations->row, error)) &&
+                    (equations->gathered = alb_allocate(patches->count, sizeof *equations->gathered, error)) &&
+                    (equations->scattered = alb_allocate(patches->count, sizeof *equations->scattered, error)) &&
+                    alb_clusters_create(&equations->clusters, patches, factors, scatter, equations->row, error);
+    if (!ok)
+        alb_radiosity_free(equations);
+    return ok;
 }
 
-// a += factor b, per channel.
-static void add(const solver *s, rgb *a, const double factor[3], const rgb *b)
+void alb_radiosity_free(alb_radiosity *equations)
 {
-    for (size_t i = 0; i < s->n; i++)
-        for (int c = 0; c < 3; c++)
-            a[i][c] += factor[c] * b[i][c];
+    alb_clusters_free(&equations->clusters);
+    free(equations->row);
+    free(equations->gathered);
+    free(equations->scattered);
+    *equations = (alb_radiosity){0};
 }
 
-static void norm(double out[3], const solver *s, const rgb *a)
+void alb_radiosity_refresh(alb_radiosity *equations) { alb_clusters_refresh(&equations->clusters, equations->scatter); }
+
+size_t alb_radiosity_bytes(const alb_radiosity *equations)
 {
-    dot(out, s, a, a);
-    for (int c = 0; c < 3; c++)
-        out[c] = sqrt(out[c]);
+    return alb_clusters_bytes(&equations->clusters) + 2 * equations->factors->patch_count * sizeof *equations->gathered;
 }
 
-// Divides each channel by its norm; a channel that has died out stays zero.
-static void normalise(const solver *s, rgb *a, const double length[3])
+static void apply(alb_rgb *out, const void *data, const alb_rgb *x)
 {
-    for (size_t i = 0; i < s->n; i++)
-        for (int c = 0; c < 3; c++)
-            a[i][c] = length[c] > 0 ? a[i][c] / length[c] : 0;
+    const alb_radiosity *equations = data;
+    alb_form_factors_apply(equations->gathered, equations->factors, x);
+    alb_scatter_apply(out, equations->scatter, (const alb_rgb *)equations->gathered);
 }
 
-// out = (I - S'F) x
-static void transport(const solver *s, rgb *out, const rgb *x)
+static bool is_opaque(const alb_scatter *scatter, size_t p)
 {
-    alb_form_factors_apply(s->gathered, s->factors, x);
-    alb_scatter_apply(out, s->scatter, (const rgb *)s->gathered);
-    for (size_t i = 0; i < s->n; i++)
-        for (int c = 0; c < 3; c++)
-            out[i][c] = x[i][c] - out[i][c];
+    return !memcmp(scatter->local[p], scatter->row_sums[p], sizeof scatter->local[p]);
 }
 
-// Givens rotations keep the Hessenberg matrix triangular; |rhs[k + 1]| is then the residual.
-static void rotate(solver *s, int c, int k)
+// An opaque patch sends out at once what it gathers; bodies scatter at the end of the sweep.
+static void sweep(alb_rgb *x, const void *data, const alb_rgb *right)
 {
-    double(*h)[RESTART] = s->hessenberg[c];
-    for (int i = 0; i < k; i++) {
-        const double upper = s->cosine[c][i] * h[i][k] + s->sine[c][i] * h[i + 1][k];
-        h[i + 1][k] = s->cosine[c][i] * h[i + 1][k] - s->sine[c][i] * h[i][k];
-        h[i][k] = upper;
-    }
-    const double length = hypot(h[k][k], h[k + 1][k]);
-    s->cosine[c][k] = length > 0 ? h[k][k] / length : 1;
-    s->sine[c][k] = length > 0 ? h[k + 1][k] / length : 0;
-    h[k][k] = length;
-    h[k + 1][k] = 0;
-    s->rhs[c][k + 1] = -s->sine[c][k] * s->rhs[c][k];
-    s->rhs[c][k] *= s->cosine[c][k];
-}
-
-// One Arnoldi step by modified Gram-Schmidt: basis[k + 1] and column k.
-static void extend(solver *s, int k)
-{
-    rgb *next = s->basis[k + 1];
-    double h[3], length[3], before[3];
-    transport(s, next, (const rgb *)s->basis[k]);
-    norm(before, s, (const rgb *)next);
-    for (int i = 0; i <= k; i++) {
-        dot(h, s, (const rgb *)next, (const rgb *)s->basis[i]);
-        const double minus[3] = {-h[0], -h[1], -h[2]};
-        add(s, next, minus, (const rgb *)s->basis[i]);
-        for (int c = 0; c < 3; c++)
-            s->hessenberg[c][i][k] = h[c];
-    }
-    norm(length, s, (const rgb *)next);
-    for (int c = 0; c < 3; c++) {
-        if (length[c] <= 1e-14 * before[c]) // the space is exhausted: what is left is rounding
-            length[c] = 0;
-        s->hessenberg[c][k + 1][k] = length[c];
-    }
-    normalise(s, next, length);
-    for (int c = 0; c < 3; c++)
-        rotate(s, c, k);
-}
-
-// x += sum_k y_k basis_k with the triangular system solved per channel.
-static void update(const solver *s, rgb *x, int steps)
-{
-    double y[RESTART][3] = {{0}};
-    for (int c = 0; c < 3; c++)
-        for (int k = steps - 1; k >= 0; k--) {
-            double rest = s->rhs[c][k];
-            for (int i = k + 1; i < steps; i++)
-                rest -= s->hessenberg[c][k][i] * y[i][c];
-            const double pivot = s->hessenberg[c][k][k];
-            y[k][c] = pivot != 0 ? rest / pivot : 0;
+    const alb_radiosity *equations = data;
+    const alb_scatter *scatter = equations->scatter;
+    const size_t n = scatter->patch_count;
+    for (size_t p = 0; p < n; p++) {
+        const int rays = alb_form_factors_rays(equations->factors, p);
+        double sum[3] = {0};
+        alb_form_factors_row(equations->row, equations->factors, p);
+        for (int q = 0; q < rays; q++)
+            for (int c = 0; c < 3 && equations->row[q] < n; c++)
+                sum[c] += x[equations->row[q]][c];
+        for (int c = 0; c < 3; c++) {
+            equations->gathered[p][c] = sum[c] / rays;
+            if (is_opaque(scatter, p))
+                x[p][c] = right[p][c] + scatter->local[p][c] * sum[c] / rays;
         }
-    for (int k = 0; k < steps; k++)
-        add(s, x, y[k], (const rgb *)s->basis[k]);
-}
-
-static double worst_of(const double values[3], const double scale[3])
-{
-    double worst = 0;
-    for (int c = 0; c < 3; c++)
-        if (scale[c] > 0)
-            worst = fmax(worst, fabs(values[c]) / scale[c]);
-    return worst;
-}
-
-static void iterate(solver *s, rgb *x, const rgb *right, alb_radiosity_report *report, double tolerance)
-{
-    double scale[3], length[3];
-    norm(scale, s, right);
-    for (*report = (alb_radiosity_report){0};;) {
-        rgb *residual = s->basis[0];
-        transport(s, residual, (const rgb *)x);
-        report->iterations++;
-        for (size_t i = 0; i < s->n; i++)
-            for (int c = 0; c < 3; c++)
-                residual[i][c] = right[i][c] - residual[i][c];
-        norm(length, s, (const rgb *)residual);
-        report->residual = worst_of(length, scale);
-        if (report->residual <= tolerance || report->iterations >= PRODUCTS_MAX)
-            return;
-        normalise(s, residual, length);
-        memset(s->rhs, 0, sizeof s->rhs);
-        for (int c = 0; c < 3; c++)
-            s->rhs[c][0] = length[c];
-        int steps = 0;
-        for (double worst = report->residual; steps < RESTART && worst > 0.9 * tolerance; report->iterations++) {
-            extend(s, steps++);
-            const double left[3] = {s->rhs[0][steps], s->rhs[1][steps], s->rhs[2][steps]};
-            worst = worst_of(left, scale);
-        }
-        update(s, x, steps);
     }
+    alb_scatter_apply(equations->scattered, scatter, (const alb_rgb *)equations->gathered);
+    for (size_t p = 0; p < n; p++)
+        for (int c = 0; c < 3 && !is_opaque(scatter, p); c++)
+            x[p][c] = right[p][c] + equations->scattered[p][c];
 }
 
-bool alb_radiosity_solve(double (*radiosity)[3], alb_radiosity_report *report, const double (*irradiance)[3],
-                         const double (*exitance)[3], const alb_scatter *scatter, const alb_form_factors *factors,
-                         const double *areas_mm2, double residual, alb_error *error)
+static void coarse(alb_rgb *x, const void *data, const alb_rgb *right)
 {
-    bool ok = false;
-    const size_t n = factors->patch_count;
-    rgb *right = NULL;
-    solver *s = alb_allocate(1, sizeof *s, error);
-    if (!s)
+    const alb_radiosity *equations = data;
+    alb_clusters_solve(x, &equations->clusters, right);
+}
+
+alb_bounce alb_radiosity_bounce(alb_radiosity *equations)
+{
+    return (alb_bounce){.count = equations->factors->patch_count,
+                        .areas_mm2 = equations->areas_mm2,
+                        .data = equations,
+                        .apply = apply,
+                        .sweep = sweep,
+                        .coarse = coarse,
+                        .even = (const alb_rgb *)equations->scatter->row_sums};
+}
+
+bool alb_radiosity_solve(alb_rgb *radiosity, alb_radiosity_report *report, alb_radiosity *equations, alb_solver solver,
+                         const alb_rgb *irradiance, const alb_rgb *exitance, const alb_rgb *start, double residual,
+                         alb_error *error)
+{
+    const size_t n = equations->factors->patch_count;
+    const alb_bounce bounce = alb_radiosity_bounce(equations);
+    alb_rgb *right = alb_allocate(n, sizeof *right, error);
+    if (!right)
         return false;
-    s->n = n, s->scatter = scatter, s->factors = factors, s->areas = areas_mm2;
-    for (size_t i = 0; i < n; i++)
-        s->total_area += areas_mm2[i];
-    for (int k = 0; k <= RESTART; k++)
-        if (!(s->basis[k] = alb_allocate(n, sizeof(rgb), error)))
-            goto done;
-    if (!(s->gathered = alb_allocate(n, sizeof(rgb), error)) || !(right = alb_allocate(n, sizeof(rgb), error)))
-        goto done;
-    alb_scatter_apply(right, scatter, irradiance);
-    for (size_t i = 0; i < n; i++)
+    if (irradiance)
+        alb_scatter_apply(right, equations->scatter, irradiance);
+    for (size_t i = 0; exitance && i < n; i++)
         for (int c = 0; c < 3; c++)
             right[i][c] += exitance[i][c];
-    memcpy(radiosity, right, n * sizeof *right);
-    iterate(s, radiosity, (const rgb *)right, report, residual);
-    ok = report->residual <= residual ||
-         alb_fail(error, ALB_INTERNAL, "radiosity: residual %.3g after %d products, asked for %.3g", report->residual,
-                  report->iterations, residual);
-done:
-    for (int k = 0; k <= RESTART; k++)
-        free(s->basis[k]);
-    free(s->gathered);
-    free(s);
+    const bool ok = alb_solver_run(radiosity, report, solver, &bounce, (const alb_rgb *)right, start, residual, error);
     free(right);
     return ok;
+}
+
+double alb_radiosity_bound(const alb_radiosity *equations, const alb_radiosity_report *report, const alb_rgb *radiosity)
+{
+    const alb_scatter *scatter = equations->scatter;
+    double kept[3] = {0}, power[3] = {0}, area = 0, worst = 0;
+    for (size_t i = 0; i < scatter->patch_count; i++) {
+        area += equations->areas_mm2[i];
+        for (int c = 0; c < 3; c++) {
+            kept[c] = fmax(kept[c], scatter->column_sums[i][c]);
+            power[c] += equations->areas_mm2[i] * radiosity[i][c];
+        }
+    }
+    for (int c = 0; c < 3; c++)
+        if (report->residual_flux[c] > 0)
+            worst = fmax(worst,
+                         kept[c] < 1 ? kept[c] / (1 - kept[c]) * report->residual_flux[c] * area / power[c] : HUGE_VAL);
+    return worst;
 }
 
 bool alb_radiosity_check(double *largest, const alb_scatter *scatter, bool closed_scene, const uint16_t *materials,
@@ -203,7 +135,7 @@ bool alb_radiosity_check(double *largest, const alb_scatter *scatter, bool close
 {
     static const char *const channels[3] = {"R", "G", "B"};
     const size_t n = scatter->patch_count;
-    const rgb *sums = (const rgb *)scatter->row_sums;
+    const alb_rgb *sums = (const alb_rgb *)scatter->row_sums;
     bool ok = true;
     size_t patch = 0;
     int channel = 0;

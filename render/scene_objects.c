@@ -123,5 +123,5 @@ bool alb_scene_read_objects(alb_scene_reader *in, alb_node root)
     for (size_t i = 0; i < count; i++)
         if (!alb_node_item_object(&node, list, i, in->error) || !read_object(in, node))
             return false;
-    return true;
+    return alb_mesh_repair(&in->scene->mesh, in->error);
 }

@@ -3,22 +3,27 @@
 // kappa the column sums of S':
 //     in = sum A (E + M),  absorbed = sum A (1 - kappa) H,  escaped = sum A B (share of sky rays), lost likewise for
 //     backs
+// What changed and what stays: rays know the meshes alone, scattering the meshes and materials, the solve everything.
+// A solution that is already there is the start of the next where the direct light has changed by little: it costs a
+// product, and each product gains about a factor of three.
 #include "render/solution.h"
 #include "base/memory.h"
 #include "base/progress.h"
 #include "render/lamp.h"
+#include "render/patch_cull.h"
 #include <stdlib.h>
 #include <string.h>
 
 const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "lights", "scattering", "solve"};
 
+// A change of the direct light, |E - E'| / |E|, below which the last solution is worth a product as a start.
+static const double small_change = 0.3;
+static const alb_solver default_solver = ALB_SOLVER_TWO_LEVEL;
+
 static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
     const size_t n = s->patches.count;
-    if (!(s->irradiance = alb_allocate(n, sizeof *s->irradiance, error)) ||
-        !(s->exitance = alb_allocate(n, sizeof *s->exitance, error)) ||
-        !(s->radiosity = alb_allocate(n, sizeof *s->radiosity, error)))
-        return false;
+    memset(s->irradiance, 0, n * sizeof *s->irradiance);
     for (size_t p = 0; p < n; p++)
         memcpy(s->exitance[p], scene->surfaces[scene->mesh.groups[p]].exitance, sizeof s->exitance[p]);
     for (size_t i = 0; i < scene->light_count; i++)
@@ -26,11 +31,25 @@ static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *er
                            UINT64_MAX - i, error))
             return false;
     s->lamps_direct = alb_lamps_are_small(&s->patches, (const double(*)[3])s->exitance);
-    if (s->lamps_direct && !alb_lamps_add(s->irradiance, (const double(*)[3])s->exitance, &s->patches, &s->tracer,
-                                          scene->seed, UINT64_MAX - ALB_LIGHTS_MAX, error))
+    return !s->lamps_direct || alb_lamps_add(s->irradiance, (const double(*)[3])s->exitance, &s->patches, &s->tracer,
+                                             scene->seed, UINT64_MAX - ALB_LIGHTS_MAX, error);
+}
+
+static bool first_light(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    const size_t n = s->patches.count;
+    if (!(s->irradiance = alb_allocate(n, sizeof *s->irradiance, error)) ||
+        !(s->exitance = alb_allocate(n, sizeof *s->exitance, error)) ||
+        !(s->radiosity = alb_allocate(n, sizeof *s->radiosity, error)))
         return false;
     s->bytes[ALB_STAGE_LIGHTS] = 3 * n * sizeof *s->radiosity;
-    return true;
+    return light_patches(s, scene, error);
+}
+
+static bool check_scattering(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    const bool closed = !s->factors.sky_rays && !s->factors.back_rays;
+    return alb_radiosity_check(&s->row_sum, &s->scatter, closed, scene->mesh.groups, scene->surfaces, error);
 }
 
 static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
@@ -38,13 +57,14 @@ static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *
     if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, error))
         return false;
     s->bytes[ALB_STAGE_SCATTERING] = alb_scatter_bytes(&s->scatter);
-    const bool closed = !s->factors.sky_rays && !s->factors.back_rays;
-    return alb_radiosity_check(&s->row_sum, &s->scatter, closed, scene->mesh.groups, scene->surfaces, error);
+    return check_scattering(s, scene, error);
 }
 
 static void take_balance(alb_solution *s, const double (*irradiance)[3])
 {
     const double(*kept)[3] = (const double(*)[3])s->scatter.column_sums;
+    s->balance = (alb_balance){0};
+    s->column_sum = 0;
     for (size_t p = 0; p < s->patches.count; p++)
         for (int c = 0; c < 3; c++) {
             const double area = s->patches.areas_mm2[p];
@@ -62,6 +82,8 @@ static bool take_across(alb_solution *s, const alb_scene *scene, const double (*
     bool wanted = false;
     for (size_t i = 0; i < scene->surface_count; i++)
         wanted |= scene->surfaces[i].slab && scene->surfaces[i].exits[ALB_TRANSMISSION].smooth;
+    free(s->across);
+    s->across = NULL;
     return !wanted || ((s->across = alb_allocate(s->patches.count, sizeof *s->across, error)) &&
                        alb_scatter_apply_across(s->across, &s->scatter, irradiance, error));
 }
@@ -82,23 +104,89 @@ static bool take_irradiance(alb_solution *s, const alb_scene *scene, alb_error *
     return ok;
 }
 
-static bool solve(alb_solution *s, const alb_scene *scene, alb_error *error)
+// From the radiosity as it stands where it is a start; small lamps are added to it at the end.
+static bool solve(alb_solution *s, const alb_scene *scene, bool start, alb_error *error)
 {
     const size_t n = s->patches.count;
-    double(*emitted)[3] = alb_allocate(n, sizeof *emitted, error);
-    s->bytes[ALB_STAGE_SOLVE] = 23 * n * sizeof *s->radiosity;
-    if (emitted && !s->lamps_direct)
-        memcpy(emitted, s->exitance, n * sizeof *emitted);
+    const double(*exitance)[3] = (const double(*)[3])s->exitance;
+    double(*guess)[3] = start ? alb_allocate(n, sizeof *guess, error) : NULL;
+    if (start && !guess)
+        return false;
+    if (start)
+        memcpy(guess, s->radiosity, n * sizeof *guess);
     const bool ok =
-        emitted &&
-        alb_radiosity_solve(s->radiosity, &s->report, (const double(*)[3])s->irradiance, (const double(*)[3])emitted,
-                            &s->scatter, &s->factors, s->patches.areas_mm2, scene->residual, error) &&
-        take_irradiance(s, scene, error);
-    free(emitted);
-    for (size_t p = 0; ok && s->lamps_direct && p < n; p++)
-        for (int c = 0; c < 3; c++)
-            s->radiosity[p][c] += s->exitance[p][c];
+        alb_radiosity_solve(s->radiosity, &s->report, &s->equations, default_solver, (const double(*)[3])s->irradiance,
+                            s->lamps_direct ? NULL : exitance, (const double(*)[3])guess, scene->residual, error);
+    free(guess);
     return ok;
+}
+
+static void add_lamps(alb_solution *s, double sign)
+{
+    for (size_t p = 0; s->lamps_direct && p < s->patches.count; p++)
+        for (int c = 0; c < 3; c++)
+            s->radiosity[p][c] += sign * s->exitance[p][c];
+}
+
+// Accounts of a solution: what it may lack, and where the light goes.
+static bool take_stock(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    s->bound = alb_radiosity_bound(&s->equations, &s->report, (const double(*)[3])s->radiosity);
+    return alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, NULL, error) &&
+           take_irradiance(s, scene, error);
+}
+
+static bool first_solve(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    if (!alb_radiosity_create(&s->equations, &s->patches, &s->scatter, &s->factors, error) ||
+        !solve(s, scene, false, error) || !take_stock(s, scene, error))
+        return false;
+    s->bytes[ALB_STAGE_SOLVE] = alb_radiosity_bytes(&s->equations) + 24 * s->patches.count * sizeof *s->radiosity;
+    add_lamps(s, 1);
+    return true;
+}
+
+// |E - E'|^2 / |E|^2 over all channels.
+static double change_of(const alb_solution *s, const double (*before)[3])
+{
+    double change = 0, all = 0;
+    for (size_t p = 0; p < s->patches.count; p++)
+        for (int c = 0; c < 3; c++) {
+            change += s->patches.areas_mm2[p] * pow(s->irradiance[p][c] - before[p][c], 2);
+            all += s->patches.areas_mm2[p] * pow(s->irradiance[p][c], 2);
+        }
+    return all > 0 ? change / all : 0;
+}
+
+bool alb_solution_relight(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    const size_t n = s->patches.count;
+    double(*before)[3] = alb_allocate(n, sizeof *before, error);
+    const double start_s = alb_clock_s();
+    if (!before)
+        return false;
+    memcpy(before, s->irradiance, n * sizeof *before);
+    add_lamps(s, -1);
+    bool ok = light_patches(s, scene, error);
+    const double lit_s = alb_clock_s();
+    ok = ok && solve(s, scene, change_of(s, (const double(*)[3])before) < small_change * small_change, error) &&
+         take_stock(s, scene, error);
+    add_lamps(s, ok ? 1 : 0);
+    s->seconds[ALB_STAGE_LIGHTS] = lit_s - start_s;
+    s->seconds[ALB_STAGE_SOLVE] = alb_clock_s() - lit_s;
+    free(before);
+    return ok;
+}
+
+bool alb_solution_rematerial(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    const double start_s = alb_clock_s();
+    alb_scatter_free(&s->scatter);
+    bool ok = scatter_patches(s, scene, error);
+    s->seconds[ALB_STAGE_SCATTERING] = alb_clock_s() - start_s;
+    if (ok)
+        alb_radiosity_refresh(&s->equations);
+    return ok && alb_solution_relight(s, scene, error);
 }
 
 static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, alb_error *error)
@@ -106,7 +194,7 @@ static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, 
     switch (stage) {
     case ALB_STAGE_TRACER:
         if (!alb_patches_create(&s->patches, &scene->mesh, error) ||
-            !alb_tracer_create(&s->tracer, &scene->mesh, error))
+            !alb_tracer_create(&s->tracer, &scene->mesh, error) || !alb_patches_cull(&s->patches, &s->tracer, error))
             return false;
         s->bytes[stage] = (size_t)s->tracer.bytes;
         return true;
@@ -117,11 +205,11 @@ static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, 
         s->bytes[stage] = alb_form_factors_bytes(&s->factors);
         return true;
     case ALB_STAGE_LIGHTS:
-        return light_patches(s, scene, error);
+        return first_light(s, scene, error);
     case ALB_STAGE_SCATTERING:
         return scatter_patches(s, scene, error);
     default:
-        return solve(s, scene, error);
+        return first_solve(s, scene, error);
     }
 }
 
@@ -148,6 +236,7 @@ void alb_solution_free(alb_solution *solution)
     alb_patches_free(&solution->patches);
     alb_tracer_free(&solution->tracer);
     alb_form_factors_free(&solution->factors);
+    alb_radiosity_free(&solution->equations);
     alb_scatter_free(&solution->scatter);
     free(solution->irradiance);
     free(solution->exitance);

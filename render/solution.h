@@ -28,12 +28,15 @@ typedef struct alb_solution {
     alb_tracer tracer;
     alb_form_factors factors;
     alb_scatter scatter;
+    alb_radiosity equations;
     double (*irradiance)[3]; // direct, of the lights
     double (*exitance)[3];   // emitted by lamps
     bool lamps_direct;       // small lamps: their light is in the irradiance
     double (*radiosity)[3];  // all that leaves
     double (*across)[3];     // the part of it that crossed a slab with smooth faces; NULL where there is none
     alb_radiosity_report report;
+    double bound;               // how far the radiosity may be from its equations' exact solution, as a share of power
+    double rays_error_percent;  // of the irradiance by rays, rms, stated from their halves; NAN: a single ray
     double row_sum, column_sum; // largest of S'
     alb_balance balance;
     double seconds[ALB_STAGES];
@@ -44,3 +47,8 @@ typedef struct alb_solution {
 // light.
 bool alb_solution_create(alb_solution *solution, const alb_scene *scene, alb_error *error);
 void alb_solution_free(alb_solution *solution);
+// The same meshes and materials under the scene's lights and exitances as they are now: lights and solve alone. A
+// failure leaves the radiosity undefined, and the solution fit for another try.
+bool alb_solution_relight(alb_solution *solution, const alb_scene *scene, alb_error *error);
+// The same meshes under the scene's surfaces and lights as they are now: scattering is rewritten, rays stay.
+bool alb_solution_rematerial(alb_solution *solution, const alb_scene *scene, alb_error *error);

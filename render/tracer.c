@@ -1,12 +1,49 @@
 // Embree's robust mode: no ray slips between triangles that share an edge. Single precision about the middle of the
-// mesh: points nearer than about 1e-7 of its extent cannot be told apart, which is why rays start offset
-// (render/patch.h).
-// Stops being true for meshes whose extent over detail exceeds 1e6.
+// mesh, so that a scene far from the origin is as sharp as one at it: points nearer than about 1e-7 of the extent
+// cannot be told apart, which is why rays start offset (render/patch.h) and fronts win over backs that near to them.
+// Whether they do is asked only after a back was met, which happens in no sound closed scene. Stops being true for
+// meshes whose extent over detail exceeds 1e6.
 #include "render/tracer.h"
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
 #else
 #include <embree3/rtcore.h>
+#endif
+
+// The two versions differ in how a filter is handed over.
+#if RTC_VERSION_MAJOR >= 4
+#define FILTERED RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS
+typedef struct RTCRayQueryContext query;
+static void intersect(RTCScene scene, query *context, RTCFilterFunctionN filter, struct RTCRayHit *ray)
+{
+    struct RTCIntersectArguments arguments;
+    rtcInitRayQueryContext(context);
+    rtcInitIntersectArguments(&arguments);
+    arguments.context = context;
+    arguments.filter = filter;
+    if (filter)
+        arguments.flags |= RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+    rtcIntersect1(scene, ray, &arguments);
+}
+static void occluded(RTCScene scene, query *context, struct RTCRay *ray)
+{
+    (void)context;
+    rtcOccluded1(scene, ray, NULL);
+}
+#else
+#define FILTERED RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION
+typedef struct RTCIntersectContext query;
+static void intersect(RTCScene scene, query *context, RTCFilterFunctionN filter, struct RTCRayHit *ray)
+{
+    rtcInitIntersectContext(context);
+    context->filter = filter;
+    rtcIntersect1(scene, context, ray);
+}
+static void occluded(RTCScene scene, query *context, struct RTCRay *ray)
+{
+    rtcInitIntersectContext(context);
+    rtcOccluded1(scene, context, ray);
+}
 #endif
 
 static bool count_bytes(void *user, ssize_t bytes, bool post)
@@ -16,18 +53,25 @@ static bool count_bytes(void *user, ssize_t bytes, bool post)
     return true;
 }
 
-static alb_vector middle_of(const alb_mesh *mesh)
+// Middle and half extent of the vertices; those that are not finite are left out.
+static void find_bounds(alb_tracer *tracer, const alb_mesh *mesh)
 {
     alb_vector low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t i = 0; i < mesh->vertex_count; i++) {
         const alb_vector v = mesh->vertices[i];
+        if (!isfinite(v.x + v.y + v.z))
+            continue;
         low = (alb_vector){fmin(low.x, v.x), fmin(low.y, v.y), fmin(low.z, v.z)};
         high = (alb_vector){fmax(high.x, v.x), fmax(high.y, v.y), fmax(high.z, v.z)};
     }
-    return mesh->vertex_count ? alb_times(0.5, alb_add(low, high)) : (alb_vector){0};
+    if (low.x > high.x)
+        return;
+    const alb_vector half = alb_times(0.5, alb_sub(high, low));
+    tracer->middle = alb_add(low, half);
+    tracer->slack_mm = 64 * 0x1p-24 * fmax(half.x, fmax(half.y, half.z));
 }
 
-static bool fill(RTCGeometry geometry, const alb_mesh *mesh, alb_vector middle)
+static bool fill(RTCGeometry geometry, const alb_mesh *mesh, alb_vector centre)
 {
     float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
                                               mesh->vertex_count);
@@ -36,7 +80,7 @@ static bool fill(RTCGeometry geometry, const alb_mesh *mesh, alb_vector middle)
     if (!vertices || !faces)
         return false;
     for (size_t i = 0; i < mesh->vertex_count; i++) {
-        const alb_vector v = alb_sub(mesh->vertices[i], middle);
+        const alb_vector v = alb_sub(mesh->vertices[i], centre);
         vertices[3 * i] = (float)v.x;
         vertices[3 * i + 1] = (float)v.y;
         vertices[3 * i + 2] = (float)v.z;
@@ -49,7 +93,7 @@ static bool fill(RTCGeometry geometry, const alb_mesh *mesh, alb_vector middle)
 
 bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *error)
 {
-    *tracer = (alb_tracer){.middle = middle_of(mesh)};
+    *tracer = (alb_tracer){0};
     RTCDevice device = rtcNewDevice(NULL);
     if (!device) {
         const enum RTCError code = rtcGetDeviceError(NULL);
@@ -61,12 +105,15 @@ bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *erro
     RTCScene scene = rtcNewScene(device);
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     tracer->scene = scene;
-    bool ok = scene && geometry && fill(geometry, mesh, tracer->middle);
+    find_bounds(tracer, mesh);
+    bool ok = scene && geometry && (!mesh->face_count || fill(geometry, mesh, tracer->middle));
     if (ok) {
-        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | FILTERED);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
-        rtcCommitGeometry(geometry);
-        rtcAttachGeometry(scene, geometry);
+        if (mesh->face_count) {
+            rtcCommitGeometry(geometry);
+            rtcAttachGeometry(scene, geometry);
+        }
         rtcCommitScene(scene);
     }
     if (geometry)
@@ -88,29 +135,60 @@ void alb_tracer_free(alb_tracer *tracer)
     *tracer = (alb_tracer){0};
 }
 
-static struct RTCRay ray_of(const alb_tracer *tracer, alb_vector from, alb_vector direction, float far)
+static struct RTCRay ray_of(const alb_tracer *tracer, alb_vector origin, alb_vector direction, float near, float far)
 {
-    const alb_vector origin = alb_sub(from, tracer->middle);
-    return (struct RTCRay){.org_x = (float)origin.x,
-                           .org_y = (float)origin.y,
-                           .org_z = (float)origin.z,
+    const alb_vector from = alb_sub(origin, tracer->middle);
+    return (struct RTCRay){.org_x = (float)from.x,
+                           .org_y = (float)from.y,
+                           .org_z = (float)from.z,
                            .dir_x = (float)direction.x,
                            .dir_y = (float)direction.y,
                            .dir_z = (float)direction.z,
+                           .tnear = near,
                            .tfar = far,
                            .mask = UINT32_MAX};
 }
 
+// A look at every triangle along a ray: Embree offers each to the filter, which turns all down and keeps what it wants.
+typedef struct sweep {
+    query query; // first: the filter is handed its address
+    alb_vector direction;
+    int crossings;
+    bool found; // the nearest front
+    alb_hit front;
+} sweep;
+
+static void look(const struct RTCFilterFunctionNArguments *at) // of single rays: N is 1
+{
+    sweep *s = (sweep *)(void *)at->context;
+    const struct RTCRay *ray = (const struct RTCRay *)(const void *)at->ray;
+    const struct RTCHit *hit = (const struct RTCHit *)(const void *)at->hit;
+    const alb_vector normal = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
+    const bool front = alb_dot(normal, s->direction) < 0;
+    at->valid[0] = 0;
+    s->crossings += front ? 1 : -1;
+    if (!front || (s->found && s->front.distance_mm <= (double)ray->tfar))
+        return;
+    s->found = true;
+    s->front = (alb_hit){
+        .face = hit->primID, .front = true, .u = (double)hit->u, .v = (double)hit->v, .distance_mm = (double)ray->tfar};
+}
+
+static void sweep_along(sweep *s, const alb_tracer *tracer, alb_vector origin, alb_vector direction, double near,
+                        double far)
+{
+    struct RTCRayHit ray = {.ray = ray_of(tracer, origin, direction, (float)near, (float)far),
+                            .hit.geomID = RTC_INVALID_GEOMETRY_ID};
+    *s = (sweep){.direction = direction};
+    intersect(tracer->scene, &s->query, look, &ray);
+}
+
 bool alb_tracer_closest(alb_hit *hit, const alb_tracer *tracer, alb_vector origin, alb_vector direction)
 {
-    struct RTCRayHit ray = {.ray = ray_of(tracer, origin, direction, INFINITY), .hit.geomID = RTC_INVALID_GEOMETRY_ID};
-#if RTC_VERSION_MAJOR >= 4
-    rtcIntersect1(tracer->scene, &ray, NULL);
-#else
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcIntersect1(tracer->scene, &context, &ray);
-#endif
+    struct RTCRayHit ray = {.ray = ray_of(tracer, origin, direction, 0, INFINITY),
+                            .hit.geomID = RTC_INVALID_GEOMETRY_ID};
+    query plain;
+    intersect(tracer->scene, &plain, NULL, &ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID)
         return false;
     const alb_vector normal = {(double)ray.hit.Ng_x, (double)ray.hit.Ng_y, (double)ray.hit.Ng_z};
@@ -119,19 +197,27 @@ bool alb_tracer_closest(alb_hit *hit, const alb_tracer *tracer, alb_vector origi
                      .u = (double)ray.hit.u,
                      .v = (double)ray.hit.v,
                      .distance_mm = (double)ray.ray.tfar};
+    if (!hit->front) {
+        sweep s;
+        sweep_along(&s, tracer, origin, direction, fmax(0, hit->distance_mm - tracer->slack_mm),
+                    hit->distance_mm + tracer->slack_mm);
+        *hit = s.found ? s.front : *hit;
+    }
     return true;
+}
+
+int alb_tracer_crossings(const alb_tracer *tracer, alb_vector origin, alb_vector direction)
+{
+    sweep s;
+    sweep_along(&s, tracer, origin, direction, 0, INFINITY);
+    return s.crossings;
 }
 
 bool alb_tracer_blocked(const alb_tracer *tracer, alb_vector from, alb_vector to)
 {
     // the far end stops short of a surface on which `to` lies
-    struct RTCRay ray = ray_of(tracer, from, alb_sub(to, from), 1 - 0x1p-18f);
-#if RTC_VERSION_MAJOR >= 4
-    rtcOccluded1(tracer->scene, &ray, NULL);
-#else
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcOccluded1(tracer->scene, &context, &ray);
-#endif
+    struct RTCRay ray = ray_of(tracer, from, alb_sub(to, from), 0, 1 - 0x1p-18f);
+    query plain;
+    occluded(tracer->scene, &plain, &ray);
     return ray.tfar < 0;
 }

@@ -5,7 +5,8 @@
 typedef struct alb_tracer {
     void *device, *scene; // Embree handles
     int64_t bytes;        // memory Embree holds; its own count
-    alb_vector middle;    // of the mesh: Embree's origin
+    alb_vector middle;    // of the mesh's bounds: Embree's origin
+    double slack_mm;      // nearer than this along a ray two surfaces may come in either order
 } alb_tracer;
 
 typedef struct alb_hit {
@@ -15,10 +16,14 @@ typedef struct alb_hit {
     double distance_mm;
 } alb_hit;
 
-// Copies the mesh. The tracer stays at its address (Embree counts bytes into it).
+// Copies the mesh, which may be empty. The tracer stays at its address (Embree counts bytes into it).
 bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *error);
 void alb_tracer_free(alb_tracer *tracer);
-// The closest hit of the ray; false where there is none. `direction` is a unit vector. Safe from many threads.
+// The closest hit of the ray; false where there is none. `direction` is a unit vector. Safe from many threads. Where a
+// front and a back lie within slack_mm (a sheet of two faces back to back) the front is what the ray meets.
 bool alb_tracer_closest(alb_hit *hit, const alb_tracer *tracer, alb_vector origin, alb_vector direction);
 // Whether anything lies on the segment between the points, ends included up to float rounding.
 bool alb_tracer_blocked(const alb_tracer *tracer, alb_vector from, alb_vector to);
+// How many more fronts than backs the whole ray passes: the winding number of its origin, negated, where the mesh is
+// closed. 0 in the open, 1 inside a room, one less inside a body than around it.
+int alb_tracer_crossings(const alb_tracer *tracer, alb_vector origin, alb_vector direction);

@@ -39,87 +39,8 @@ static void closed_sphere_is_exact(void **state)
     alb_scene_free(&scene);
 }
 
-// A matrix S' of its own choice as the sparse rows of an alb_scatter.
-static void random_scatter(alb_scatter *scatter, size_t n, uint64_t seed)
-{
-    *scatter = (alb_scatter){.patch_count = n};
-    scatter->local = calloc(n, sizeof *scatter->local);
-    scatter->row_starts = calloc(n + 1, sizeof *scatter->row_starts);
-    scatter->sources = calloc(n * n, sizeof *scatter->sources);
-    scatter->weights = calloc(n * n, sizeof *scatter->weights);
-    for (size_t j = 0; j < n; j++) {
-        double row[3] = {0};
-        scatter->row_starts[j + 1] = (j + 1) * n;
-        for (size_t i = 0; i < n; i++) {
-            alb_random random = alb_random_at(seed, j, i);
-            scatter->sources[j * n + i] = (uint32_t)i;
-            for (int c = 0; c < 3; c++) {
-                const double u = alb_random_uniform(&random);
-                scatter->weights[j * n + i][c] = (float)(u * u * u * u);
-                row[c] += u * u * u * u;
-            }
-        }
-        alb_random random = alb_random_at(seed, n + j, 0);
-        for (int c = 0; c < 3; c++) { // row sums from 0.3 to 0.98
-            const float scale = (float)((0.3 + 0.68 * alb_random_uniform(&random)) / row[c]);
-            for (size_t i = 0; i < n; i++)
-                scatter->weights[j * n + i][c] *= scale;
-        }
-    }
-}
-
-// On a spherical enclosure F = 1 w^T (w the shares of area), so that for any S' and E (Sherman-Morrison)
-//     B = S'E + S'1 (w^T S'E) / (1 - w^T S'1)
-// F is laid out with counts of rays that are exactly the areas' shares: what is tested is the solver, S' and the areas.
-static void any_scattering_on_a_sphere_is_exact(void **state)
-{
-    (void)state;
-    enum { N = 60, RAYS = 997 };
-    alb_error error = {0};
-    alb_scatter scatter;
-    double areas[N] = {0}, ones[N][3], light[N][3], dark[N][3] = {{0}}, first[N][3], rows[N][3], found[N][3];
-    alb_form_factors f;
-    uint32_t *hits = calloc(N * RAYS, sizeof *hits);
-    random_scatter(&scatter, N, 21);
-    for (int q = 0; q < RAYS; q++) {
-        alb_random random = alb_random_at(22, 0, (uint64_t)q);
-        const double u = alb_random_uniform(&random);
-        const uint32_t hit = (uint32_t)(N * u * u); // unequal: from 1 to over 100 rays
-        areas[hit] += 1;
-        for (size_t p = 0; p < N; p++)
-            hits[p * RAYS + (size_t)q] = hit;
-    }
-    check_ok(alb_form_factors_from_hits(&f, hits, N, RAYS, &error), &error);
-    free(hits);
-    for (size_t p = 0; p < N; p++) {
-        alb_random random = alb_random_at(23, 0, p);
-        for (int c = 0; c < 3; c++) {
-            ones[p][c] = 1;
-            light[p][c] = alb_random_uniform(&random);
-        }
-    }
-    alb_radiosity_report report;
-    check_ok(alb_radiosity_solve(found, &report, (const double(*)[3])light, (const double(*)[3])dark, &scatter, &f,
-                                 areas, 1e-6, &error),
-             &error);
-    assert_true(report.iterations < 12); // F has rank one: the space is exhausted after two products
-    alb_scatter_apply(first, &scatter, (const double(*)[3])light);
-    alb_scatter_apply(rows, &scatter, (const double(*)[3])ones);
-    for (int c = 0; c < 3; c++) {
-        double lit = 0, kept = 0;
-        for (size_t p = 0; p < N; p++) {
-            lit += areas[p] / RAYS * first[p][c];
-            kept += areas[p] / RAYS * rows[p][c];
-        }
-        for (size_t p = 0; p < N; p++)
-            check_relative(found[p][c], first[p][c] + rows[p][c] * lit / (1 - kept),
-                           1e-5); // residual / (1 - kept), at most 20 times
-    }
-    alb_form_factors_free(&f);
-    alb_scatter_free(&scatter);
-}
-
-// The same with rays and a profile: a translucent shell lit by a beam. Each patch's own rays are random, so the mean of
+// On a spherical enclosure B = S'E + S'1 (w^T S'E) / (1 - w^T S'1), w the shares of area (test_solver.c); here with
+// rays and a profile: a translucent shell lit by a beam. Each patch's own rays are random, so the mean of
 // B is checked against the closed form with the sampling error found over seeds; the sphere's facets cost what a finer
 // one shows.
 static void translucent_sphere_agrees(void **state)
@@ -398,7 +319,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closed_sphere_is_exact),
-        cmocka_unit_test(any_scattering_on_a_sphere_is_exact),
         cmocka_unit_test(translucent_sphere_agrees),
         cmocka_unit_test(energy_is_conserved),
         cmocka_unit_test(refuses_scattering_that_creates_light),

@@ -1,0 +1,222 @@
+// The coarse level: irradiance even on each cluster, scattering local (all that light spreads inside a body stays
+// within its cluster). With s the row sums of S', Q the area mean over a cluster and P its transpose,
+//     x = v + s P g,    g = F_c (Q v + s_c g)
+// F_c takes 256 of the rays of a cluster's patches, by a lattice over area and over the sorted row of each patch. The
+// coarse solution is a guess that GMRES corrects: what it gets wrong costs products, not accuracy.
+#include "render/radiosity_clusters.h"
+#include "base/memory.h"
+#include "base/vector_clones.h"
+#include "render/radiosity_solver.h"
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIZE = 16, CLUSTERS_MAX = 60000 };
+static const double coarse_residual = 0.03;
+
+typedef struct placed {
+    uint64_t key; // material, main direction, place along a Morton curve
+    uint32_t patch;
+} placed;
+
+static int by_key(const void *a, const void *b)
+{
+    const placed *x = a, *y = b;
+    if (x->key != y->key)
+        return x->key < y->key ? -1 : 1;
+    return (x->patch > y->patch) - (x->patch < y->patch);
+}
+
+// Ten bits with two zeros after each.
+static uint64_t spread(double share)
+{
+    uint64_t bits = (uint64_t)fmin(1023, fmax(0, 1024 * share)), out = 0;
+    for (int k = 0; k < 10; k++)
+        out |= (bits >> k & 1) << (3 * k);
+    return out;
+}
+
+static uint64_t main_direction(alb_vector n)
+{
+    const double x = fabs(n.x), y = fabs(n.y), z = fabs(n.z);
+    return x >= y && x >= z ? n.x > 0 : y >= z ? 2 + (n.y > 0) : 4 + (n.z > 0);
+}
+
+static void place(placed *out, const alb_patches *patches)
+{
+    alb_vector low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t p = 0; p < patches->count; p++) {
+        const alb_vector c = patches->centroids[p];
+        low = (alb_vector){fmin(low.x, c.x), fmin(low.y, c.y), fmin(low.z, c.z)};
+        high = (alb_vector){fmax(high.x, c.x), fmax(high.y, c.y), fmax(high.z, c.z)};
+    }
+    const double side = fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z));
+    for (size_t p = 0; p < patches->count; p++) {
+        const alb_vector c = alb_times(side > 0 ? 1 / side : 0, alb_sub(patches->centroids[p], low));
+        const uint64_t group = patches->mesh->groups[p];
+        out[p].key =
+            group << 36 | main_direction(patches->normals[p]) << 32 | spread(c.x) << 2 | spread(c.y) << 1 | spread(c.z);
+        out[p].patch = (uint32_t)p;
+    }
+}
+
+// Numbers the clusters in the order of the sorted patches, none across materials or directions.
+static size_t cut(uint16_t *cluster, const placed *sorted, size_t n)
+{
+    const size_t size = n / (CLUSTERS_MAX / 2) > SIZE ? n / (CLUSTERS_MAX / 2) : SIZE;
+    size_t count = 0, held = 0;
+    for (size_t k = 0; k < n; k++) {
+        if (k && (held == size || sorted[k].key >> 32 != sorted[k - 1].key >> 32)) {
+            held = 0;
+            count += count < CLUSTERS_MAX - 1;
+        }
+        cluster[sorted[k].patch] = (uint16_t)count;
+        held++;
+    }
+    return n ? count + 1 : 0;
+}
+
+// The hits of a cluster's rays: at equal steps through the area of its members, and through the row of each.
+static void take_hits(alb_clusters *out, size_t which, const placed *members, size_t count,
+                      const alb_form_factors *factors, uint32_t *row)
+{
+    const double step = out->areas_mm2[which] / ALB_CLUSTER_RAYS;
+    uint16_t *hits = out->hits + which * ALB_CLUSTER_RAYS;
+    double before = 0;
+    size_t q = 0;
+    for (size_t k = 0; k < count; k++) {
+        const uint32_t patch = members[k].patch;
+        const double area = out->patch_areas_mm2[patch], rays = alb_form_factors_rays(factors, patch);
+        alb_form_factors_row(row, factors, patch);
+        for (; q < ALB_CLUSTER_RAYS && (((double)q + 0.5) * step < before + area || k + 1 == count); q++) {
+            const double into = fmin(fmax((((double)q + 0.5) * step - before) / area, 0), 1);
+            const uint32_t hit = row[(size_t)fmin(into * rays, rays - 1)];
+            hits[q] = hit < out->patch_count ? out->cluster[hit] : (uint16_t)out->count;
+        }
+        before += area;
+    }
+}
+
+static void fill(alb_clusters *out, const placed *sorted, const alb_form_factors *factors, uint32_t *row)
+{
+    const size_t n = out->patch_count;
+    for (size_t p = 0; p < n; p++)
+        out->areas_mm2[out->cluster[p]] += out->patch_areas_mm2[p];
+    for (size_t first = 0, end; first < n; first = end) {
+        const uint16_t which = out->cluster[sorted[first].patch];
+        for (end = first + 1; end < n && out->cluster[sorted[end].patch] == which;)
+            end++;
+        take_hits(out, which, sorted + first, end - first, factors, row);
+    }
+}
+
+bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, const alb_form_factors *factors,
+                         const alb_scatter *scatter, uint32_t *row, alb_error *error)
+{
+    const size_t n = patches->count;
+    *clusters = (alb_clusters){.patch_count = n, .patch_areas_mm2 = patches->areas_mm2};
+    placed *sorted = alb_allocate(n, sizeof *sorted, error);
+    bool ok = sorted && (clusters->cluster = alb_allocate(n, sizeof *clusters->cluster, error));
+    if (ok) {
+        place(sorted, patches);
+        qsort(sorted, n, sizeof *sorted, by_key);
+        clusters->count = cut(clusters->cluster, sorted, n);
+        const size_t count = clusters->count;
+        ok = (clusters->areas_mm2 = alb_allocate(count, sizeof *clusters->areas_mm2, error)) &&
+             (clusters->hits = alb_allocate(count * ALB_CLUSTER_RAYS, sizeof *clusters->hits, error)) &&
+             (clusters->kept = alb_allocate(count, sizeof *clusters->kept, error)) &&
+             (clusters->values = alb_allocate(count + 1, sizeof *clusters->values, error)) &&
+             (clusters->right = alb_allocate(count, sizeof *clusters->right, error)) &&
+             (clusters->found = alb_allocate(count, sizeof *clusters->found, error));
+    }
+    if (ok) {
+        fill(clusters, sorted, factors, row);
+        alb_clusters_refresh(clusters, scatter);
+    } else
+        alb_clusters_free(clusters);
+    free(sorted);
+    return ok;
+}
+
+void alb_clusters_free(alb_clusters *clusters)
+{
+    free(clusters->cluster);
+    free(clusters->areas_mm2);
+    free(clusters->hits);
+    free(clusters->kept);
+    free(clusters->values);
+    free(clusters->right);
+    free(clusters->found);
+    *clusters = (alb_clusters){0};
+}
+
+size_t alb_clusters_bytes(const alb_clusters *clusters)
+{
+    return clusters->patch_count * sizeof *clusters->cluster +
+           clusters->count * (ALB_CLUSTER_RAYS * sizeof *clusters->hits + sizeof(double) + 3 * sizeof(alb_rgb) +
+                              sizeof *clusters->values);
+}
+
+// out = Q values
+static void average(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *values)
+{
+    memset(out, 0, clusters->count * sizeof *out);
+    for (size_t p = 0; p < clusters->patch_count; p++)
+        for (int c = 0; c < 3; c++)
+            out[clusters->cluster[p]][c] += clusters->patch_areas_mm2[p] * values[p][c];
+    for (size_t k = 0; k < clusters->count; k++)
+        for (int c = 0; c < 3; c++)
+            out[k][c] /= clusters->areas_mm2[k];
+}
+
+void alb_clusters_refresh(alb_clusters *clusters, const alb_scatter *scatter)
+{
+    clusters->sums = (const alb_rgb *)scatter->row_sums;
+    average(clusters->kept, clusters, clusters->sums);
+}
+
+// out = F_c values
+ALB_VECTOR_CLONES
+static void gather(alb_rgb *out, const alb_clusters *clusters)
+{
+    typedef float float4 __attribute__((vector_size(16)));
+#pragma omp parallel for schedule(static)
+    for (size_t k = 0; k < clusters->count; k++) {
+        const uint16_t *hits = clusters->hits + k * ALB_CLUSTER_RAYS;
+        float4 sum = {0}, value;
+        for (int q = 0; q < ALB_CLUSTER_RAYS; q++) {
+            memcpy(&value, clusters->values[hits[q]], sizeof value);
+            sum += value;
+        }
+        for (int c = 0; c < 3; c++)
+            out[k][c] = (double)sum[c] / ALB_CLUSTER_RAYS;
+    }
+}
+
+// out = F_c s_c x
+static void bounce(alb_rgb *out, const void *data, const alb_rgb *x)
+{
+    const alb_clusters *clusters = data;
+    for (size_t k = 0; k < clusters->count; k++)
+        for (int c = 0; c < 3; c++)
+            clusters->values[k][c] = (float)(clusters->kept[k][c] * x[k][c]);
+    gather(out, clusters);
+}
+
+void alb_clusters_solve(alb_rgb *x, const alb_clusters *clusters, const alb_rgb *right)
+{
+    alb_radiosity_report report;
+    const alb_bounce coarse = {
+        .count = clusters->count, .areas_mm2 = clusters->areas_mm2, .data = clusters, .apply = bounce};
+    average(clusters->found, clusters, right);
+    for (size_t k = 0; k < clusters->count; k++)
+        for (int c = 0; c < 3; c++)
+            clusters->values[k][c] = (float)clusters->found[k][c];
+    gather(clusters->right, clusters);
+    if (!alb_solver_run(clusters->found, &report, ALB_SOLVER_GMRES, &coarse, (const alb_rgb *)clusters->right, NULL,
+                        coarse_residual, NULL))
+        memset(clusters->found, 0, clusters->count * sizeof *clusters->found); // no memory: as without this level
+#pragma omp parallel for schedule(static)
+    for (size_t p = 0; p < clusters->patch_count; p++)
+        for (int c = 0; c < 3; c++)
+            x[p][c] = right[p][c] + clusters->sums[p][c] * clusters->found[clusters->cluster[p]][c];
+}

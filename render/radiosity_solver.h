@@ -1,0 +1,64 @@
+// Solvers of x = b + K x, three channels at once, K one bounce of light (S'F for radiosity) known by its products
+// alone.
+#pragma once
+#include "render/radiosity_vectors.h"
+
+typedef enum alb_solver {
+    ALB_SOLVER_JACOBI,           // one bounce after the other
+    ALB_SOLVER_GAUSS_SEIDEL,     // the same with what is new already, patch by patch
+    ALB_SOLVER_ENERGY_CORRECTED, // Jacobi, and even light added until the power balances
+    ALB_SOLVER_GMRES,            // smallest residual over all bounces so far
+    ALB_SOLVER_TWO_LEVEL,        // GMRES, each direction first solved on clusters of patches
+    ALB_SOLVERS
+} alb_solver;
+extern const char *const alb_solver_names[ALB_SOLVERS]; // "jacobi", "gauss_seidel", ...
+
+// Products of single precision hold 1e-7 or so: a smaller residual than this is not promised where it is asked for.
+#define ALB_RESIDUAL_LEAST 1e-6
+enum { ALB_PRODUCTS_MAX = 500 };
+
+typedef struct alb_bounce {
+    size_t count;
+    const double *areas_mm2;
+    const void *data;
+    void (*apply)(alb_rgb *out, const void *data, const alb_rgb *x); // out = K x
+    // x = right + K x in place, row by row with the rows already done. NULL: no Gauss-Seidel.
+    void (*sweep)(alb_rgb *x, const void *data, const alb_rgb *right);
+    // x = about (I - K)^-1 right, at a small part of the cost of a product. NULL: no two levels.
+    void (*coarse)(alb_rgb *x, const void *data, const alb_rgb *right);
+    const alb_rgb *even; // K of even light, or like it: the direction of the energy correction. NULL: ones
+} alb_bounce;
+
+typedef struct alb_radiosity_report {
+    int iterations;                       // products with K
+    double residual;                      // |b + K x - x| / |b|, area-weighted 2-norm, worst channel, recomputed at the
+                                          // end. What is returned is b + K x, one bounce better
+    double residual_flux[3];              // mean over area of |b + K x - x|
+    double history[ALB_PRODUCTS_MAX + 1]; // residual after each product
+} alb_radiosity_report;
+
+// Solves to the relative residual, or as near as rounding lets it come below ALB_RESIDUAL_LEAST. start (may be NULL) is
+// a guess, and costs one product. ALB_INTERNAL with the numbers where ALB_PRODUCTS_MAX products do not reach it;
+// ALB_USAGE where the solver lacks what it needs of the bounce.
+bool alb_solver_run(alb_rgb *x, alb_radiosity_report *report, alb_solver solver, const alb_bounce *bounce,
+                    const alb_rgb *right, const alb_rgb *start, double residual, alb_error *error);
+
+// What the solvers share: one run under way.
+typedef struct alb_run {
+    const alb_bounce *bounce;
+    const alb_rgb *right;
+    alb_space space;
+    alb_rgb *x, *residual;
+    double scale[3]; // |b|
+    double wanted;
+    alb_radiosity_report *report;
+} alb_run;
+
+// One product: residual = b + K x - x, noted. True where the run is over: it is small enough, or products are spent.
+bool alb_run_residual(alb_run *run);
+// Largest of length[c] / scale[c].
+double alb_run_worst(const alb_run *run, const double length[3]);
+// Counts a product and notes the residual after it.
+void alb_run_note(alb_run *run, double residual);
+bool alb_run_gmres(alb_run *run, alb_error *error);
+bool alb_run_two_level(alb_run *run, alb_error *error);

@@ -1,0 +1,34 @@
+// Vectors of three channels a patch and what solvers do with them: inner products weighted by area and sums of many
+// vectors at once, each in one pass over memory. Same bytes with any number of threads: partial sums of blocks of fixed
+// size, added in order.
+#pragma once
+#include "base/error.h"
+#include <stddef.h>
+
+typedef double alb_rgb[3];
+
+enum { ALB_SPACE_VECTORS = 24 }; // at once, at most
+
+typedef struct alb_space {
+    size_t count;
+    const double *areas_mm2; // borrowed
+    double total_mm2;
+    double (*partial)[ALB_SPACE_VECTORS][3]; // scratch: of each block
+} alb_space;
+
+bool alb_space_create(alb_space *space, const double *areas_mm2, size_t count, alb_error *error);
+void alb_space_free(alb_space *space);
+
+// out[k] = <a, b_k> per channel, the mean over area.
+void alb_space_dots(double (*out)[3], const alb_space *space, const alb_rgb *a, alb_rgb *const *b, int count);
+// a += sum_k factors[k] b_k; norm (may be NULL) of the result.
+void alb_space_add(double norm[3], const alb_space *space, alb_rgb *a, const double (*factors)[3], alb_rgb *const *b,
+                   int count);
+// a *= factor.
+void alb_space_scale(const alb_space *space, alb_rgb *a, const double factor[3]);
+// r = right + r - x, with its norm and its mean absolute value: the residual from r = K x.
+void alb_space_residual(double norm[3], double mean[3], const alb_space *space, alb_rgb *r, const alb_rgb *right,
+                        const alb_rgb *x);
+// Area-weighted 2-norm; mean over area of |a|.
+void alb_space_norm(double out[3], const alb_space *space, const alb_rgb *a);
+void alb_space_mean(double out[3], const alb_space *space, const alb_rgb *a);
