@@ -1,5 +1,6 @@
 // The error that rows of rays state, against irradiances known without rays.
 #include "convex_room.h"
+#include "render/solution.h"
 
 enum { CASES = 14 };
 
@@ -72,10 +73,73 @@ static void stated_error_holds(void **state)
     world_free(&w);
 }
 
+// A room with a ball under a point light, to a stated error: fewer rays than even rows that state the same.
+static void rays_go_where_light_needs_them(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    world w;
+    alb_form_factors even, grown;
+    double stated, reached;
+    const alb_box fine = {.size_mm = {4, 4, 4}, .cells = {12, 12, 12}, .grading = 1, .inward = true};
+    world_of_box(&w, &fine);
+    const size_t n = w.patches.count;
+    rgb *spot = calloc(n, sizeof *spot);
+    for (size_t p = 0; p < n; p++) { // in a corner of the floor: most of the room sees it far away
+        const alb_vector c = w.patches.centroids[p];
+        spot[p][0] = c.x < -1.4 && c.y < -1.4 && w.patches.normals[p].z > 0.9;
+    }
+    cast(&even, &w, 1024, 1);
+    check_ok(alb_form_factors_error(&stated, &even, (const rgb *)spot, NULL, &error), &error);
+    cast(&grown, &w, 64, 1);
+    check_ok(alb_form_factors_refine(&reached, &grown, &w.patches, &w.tracer, (const rgb *)spot, NULL, stated, 16384,
+                                     &error),
+             &error);
+    check_below(reached, 1.02 * stated);
+    check_below((double)grown.rows.first[n], (double)even.rows.first[n] / 1.25);
+    alb_form_factors_free(&even);
+    alb_form_factors_free(&grown);
+    free(spot);
+    world_free(&w);
+}
+
+// From the scene's key to the rows: the error that was asked for is what the solution states, and light stays balanced.
+static void a_scene_reaches_its_error(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    const alb_surface wall = {.name = "wall", .reflectance = {0.7, 0.5, 0.3}};
+    alb_light lights[2] = {{.kind = ALB_LIGHT_POINT, .position_mm = {1, 1, 1.5}, .flux = {1, 1, 1}},
+                           {.kind = ALB_LIGHT_ENVIRONMENT, .radiance = {0.1, 0.1, 0.1}}};
+    for (size_t open = 0; open < 2; open++) {
+        alb_solution s;
+        alb_surface surface = wall;
+        alb_scene scene = {.rays_per_patch = 64,
+                           .residual = 1e-4,
+                           .error_percent = 2,
+                           .seed = 3,
+                           .surfaces = &surface,
+                           .surface_count = 1,
+                           .lights = lights,
+                           .light_count = 2};
+        check_ok(alb_shape_box(&scene.mesh, &room, &error), &error);
+        scene.mesh.face_count -= open * 72; // without its last wall
+        check_ok(alb_solution_create(&s, &scene, &error), &error);
+        check_below(s.rays_error_percent, 2);
+        assert_true(s.factors.rows.first[s.patches.count] > 64 * s.patches.count);
+        assert_true((s.factors.sky_rays > 0) == (open > 0));
+        check_relative(s.balance.absorbed[0] + s.balance.escaped[0], s.balance.in[0], 0.02);
+        alb_solution_free(&s);
+        alb_mesh_free(&scene.mesh);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(stated_error_holds),
+        cmocka_unit_test(rays_go_where_light_needs_them),
+        cmocka_unit_test(a_scene_reaches_its_error),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
