@@ -1,0 +1,287 @@
+// Shortest paths in a plane section of a body.
+//
+// The chord between two points of the body leaves it through one triangle and returns through another. The plane
+// through the chord that contains the sum of their two normals, inwards, cuts the surface along a curve between them,
+// which is followed from triangle to triangle; a string drawn tight around it from end to end is the convex hull of the
+// curve and the ends. About a straight edge between two planes, and about circles, spheres and cylinders across their
+// axis, this plane holds the shortest path itself (for the edge: the chord meets the bisecting plane where the unfolded
+// path meets the edge). Elsewhere the corners of the path are then moved along the edges of the mesh on which they lie,
+// to where both sides meet the edge at one angle. What remains is second order in the angle between the plane and the
+// true path.
+#include "render/optical_solid.h"
+
+enum { CROSSINGS = 48, POINTS = 1024, SWEEPS = 4 };
+static const double worth_turning = 1.05; // detour beyond which other planes are tried
+
+typedef struct plane {
+    alb_vector origin, along, up, normal; // along the chord; up: the side of the path
+} plane;
+
+// Where the section crosses an edge of the mesh.
+typedef struct cut {
+    double x, y; // along the chord, and up
+    alb_vector a, b;
+    uint32_t triangle;
+    int order; // along the curve; the next curve begins with a gap
+} cut;
+
+static double height(const plane *p, alb_vector v) { return alb_dot(p->normal, alb_sub(v, p->origin)); }
+
+// The cut of edge k of the triangle; false where both ends lie on one side. A corner in the plane counts as above it.
+static bool cut_edge(cut *out, const alb_surface_net *net, uint32_t triangle, int k, const plane *p)
+{
+    const alb_vector a = net->triangles[triangle][k], b = net->triangles[triangle][(k + 1) % 3];
+    const double ha = height(p, a), hb = height(p, b);
+    if ((ha >= 0) == (hb >= 0))
+        return false;
+    const alb_vector at = alb_sub(alb_add(a, alb_times(ha / (ha - hb), alb_sub(b, a))), p->origin);
+    *out = (cut){.x = alb_dot(at, p->along), .y = alb_dot(at, p->up), .a = a, .b = b, .triangle = triangle};
+    return true;
+}
+
+static int entry_of(const alb_crossing *crossings, size_t count, uint32_t triangle)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!crossings[i].leaves && crossings[i].triangle == triangle)
+            return (int)i;
+    return -1;
+}
+
+// Follows the curve (its number for the order) from where the chord leaves, upwards, until it is back at the chord. The
+// crossing by which it returns, or -1.
+static int follow(cut *cuts, int *cut_count, int curve, const alb_surface_net *net, const plane *p,
+                  const alb_crossing *crossings, size_t crossing_count, uint32_t triangle)
+{
+    cut best = {0}, found;
+    int edge = -1;
+    for (int k = 0; k < 3; k++)
+        if (cut_edge(&found, net, triangle, k, p) && (edge < 0 || found.y > best.y))
+            best = found, edge = k;
+    while (edge >= 0 && *cut_count < POINTS) {
+        best.order = *cut_count + curve;
+        cuts[(*cut_count)++] = best;
+        const uint32_t across = net->neighbours[triangle][edge];
+        if (across == UINT32_MAX)
+            return -1;
+        triangle = across / 3;
+        const int entry = entry_of(crossings, crossing_count, triangle), came = (int)(across % 3);
+        if (entry >= 0)
+            return entry;
+        edge = -1;
+        for (int k = 0; k < 3 && edge < 0; k++)
+            if (k != came && cut_edge(&best, net, triangle, k, p))
+                edge = k;
+    }
+    return -1;
+}
+
+// By falling angle seen from the start of the chord; at one angle the nearer first.
+static bool before(const cut *a, const cut *b)
+{
+    const double cross = a->x * b->y - a->y * b->x;
+    return cross < 0 || (cross == 0 && a->x * a->x + a->y * a->y < b->x * b->x + b->y * b->y);
+}
+
+static void sort(cut *cuts, int count)
+{
+    for (int gap = count > 64 ? count / 3 : 1;; gap = gap > 3 ? gap / 3 : 1) {
+        for (int i = gap; i < count; i++) {
+            const cut moved = cuts[i];
+            int j = i;
+            for (; j >= gap && before(&moved, &cuts[j - gap]); j -= gap)
+                cuts[j] = cuts[j - gap];
+            cuts[j] = moved;
+        }
+        if (gap == 1)
+            break;
+    }
+}
+
+// The hull from (0, 0) over the cuts to (length, 0), in place.
+static int tighten(cut *cuts, int count, double length)
+{
+    int kept = 0, above = 0;
+    for (int i = 0; i < count; i++)
+        if (cuts[i].y > 0)
+            cuts[above++] = cuts[i];
+    sort(cuts, above);
+    for (int i = 0; i <= above; i++) {
+        const double x = i < above ? cuts[i].x : length, y = i < above ? cuts[i].y : 0;
+        while (kept > 0) {
+            const cut *top = &cuts[kept - 1];
+            const double bx = kept > 1 ? cuts[kept - 2].x : 0, by = kept > 1 ? cuts[kept - 2].y : 0;
+            if ((top->x - bx) * (y - by) - (top->y - by) * (x - bx) < 0)
+                break;
+            kept--;
+        }
+        if (i < above)
+            cuts[kept++] = cuts[i];
+    }
+    return kept;
+}
+
+// Where on the edge a path from p to q over it is shortest: both unfolded into one plane.
+static alb_vector on_edge(alb_vector a, alb_vector b, alb_vector p, alb_vector q)
+{
+    const alb_vector e = alb_sub(b, a), pa = alb_sub(p, a), qa = alb_sub(q, a);
+    const double length = alb_length(e), zp = alb_dot(pa, e) / length, zq = alb_dot(qa, e) / length;
+    const double rp = sqrt(fmax(0, alb_dot(pa, pa) - zp * zp)), rq = sqrt(fmax(0, alb_dot(qa, qa) - zq * zq));
+    const double z = rp + rq > 0 ? (zp * rq + zq * rp) / (rp + rq) : 0.5 * (zp + zq);
+    return alb_add(a, alb_times(fmin(fmax(z / length, 0), 1), e));
+}
+
+static double length_of(const alb_bends *bends)
+{
+    double length = 0;
+    for (int i = 1; i < bends->count; i++)
+        length += alb_length(alb_sub(bends->at[i], bends->at[i - 1]));
+    return length;
+}
+
+// Legs that do not follow the surface must stay inside.
+static bool legs_are_inside(const alb_bends *bends, const cut *hull, int kept, const alb_optical_solid *solid)
+{
+    for (int i = 0; i <= kept; i++) {
+        if (i > 0 && i < kept && hull[i].order - hull[i - 1].order == 1)
+            continue;
+        if (!alb_voxels_inside(&solid->voxels, bends->at[i], bends->at[i + 1]))
+            return false;
+    }
+    return true;
+}
+
+// The mean normal of the triangles on both sides of the edge that is cut.
+static alb_vector normal_at(const cut *c, const alb_surface_net *net)
+{
+    for (int k = 0; k < 3; k++) {
+        const alb_vector a = net->triangles[c->triangle][k];
+        const uint32_t across = net->neighbours[c->triangle][k];
+        if (a.x == c->a.x && a.y == c->a.y && a.z == c->a.z && across != UINT32_MAX)
+            return alb_unit(alb_add(net->normals[c->triangle], net->normals[across / 3]));
+    }
+    return net->normals[c->triangle];
+}
+
+// Measures the corners as they are, then moves them off the surface; false where a leg leaves the body.
+static bool finish(alb_bends *bends, const cut *hull, int kept, const alb_optical_solid *solid)
+{
+    bends->length_mm = length_of(bends);
+    for (int i = 0; i < kept; i++)
+        bends->at[i + 1] = alb_sub(bends->at[i + 1], alb_times(solid->lift_mm, normal_at(&hull[i], &solid->net)));
+    return legs_are_inside(bends, hull, kept, solid);
+}
+
+// The path over the hull's corners, moved along their edges if that stays inside.
+static bool string(alb_bends *bends, const cut *hull, int kept, const alb_optical_solid *solid, alb_vector from,
+                   alb_vector to, const plane *p)
+{
+    if (kept + 2 > ALB_BENDS_MAX)
+        return false;
+    bends->count = kept + 2;
+    bends->at[0] = from, bends->at[kept + 1] = to;
+    for (int i = 0; i < kept; i++)
+        bends->at[i + 1] = alb_add(p->origin, alb_add(alb_times(hull[i].x, p->along), alb_times(hull[i].y, p->up)));
+    alb_bends moved = *bends;
+    for (int sweep = 0; sweep < SWEEPS; sweep++)
+        for (int i = 0; i < kept; i++)
+            moved.at[i + 1] = on_edge(hull[i].a, hull[i].b, moved.at[i], moved.at[i + 2]);
+    if (finish(&moved, hull, kept, solid)) {
+        *bends = moved;
+        return true;
+    }
+    return finish(bends, hull, kept, solid);
+}
+
+bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to, alb_vector towards)
+{
+    alb_crossing crossings[CROSSINGS];
+    cut cuts[POINTS];
+    int cut_count = 0;
+    const alb_vector chord = alb_sub(to, from);
+    const double length = alb_length(chord);
+    plane p = {.origin = from, .along = alb_unit(chord)};
+    p.up = alb_unit(alb_sub(towards, alb_times(alb_dot(towards, p.along), p.along)));
+    p.normal = alb_cross(p.along, p.up);
+    const size_t count = alb_voxels_crossings(crossings, CROSSINGS, &solid->voxels, from, to);
+    if (count > CROSSINGS || !(alb_dot(p.up, p.up) > 0.5))
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        if (!crossings[i].leaves)
+            continue;
+        const int back = follow(cuts, &cut_count, (int)i, &solid->net, &p, crossings, count, crossings[i].triangle);
+        if (back < 0)
+            return false;
+        if ((size_t)back > i)
+            i = (size_t)back;
+    }
+    const int kept = tighten(cuts, cut_count, length);
+    return string(bends, cuts, kept, solid, from, to, &p);
+}
+
+static alb_vector turned(alb_vector up, alb_vector along, double angle)
+{
+    return alb_add(alb_times(cos(angle), up), alb_times(sin(angle), alb_cross(along, up)));
+}
+
+// Three planes, then where a parabola through their lengths is lowest; then the same closer by.
+bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to,
+                    alb_vector towards)
+{
+    const alb_vector chord = alb_sub(to, from), along = alb_unit(chord);
+    alb_vector up = alb_unit(alb_sub(towards, alb_times(alb_dot(towards, along), along)));
+    if (!alb_slice(bends, solid, from, to, up))
+        return false;
+    double step = 0.3;
+    for (int round = 0; round < 3 && bends->length_mm > worth_turning * alb_length(chord); round++, step /= 3) {
+        alb_bends other[2];
+        double length[2];
+        for (int k = 0; k < 2; k++) {
+            const bool ok = alb_slice(&other[k], solid, from, to, turned(up, along, k ? step : -step));
+            length[k] = ok ? other[k].length_mm : 2 * bends->length_mm;
+        }
+        const double bend = length[0] + length[1] - 2 * bends->length_mm;
+        double angle = bend > 0 ? 0.5 * step * (length[0] - length[1]) / bend : 0;
+        angle = fmin(fmax(angle, -2 * step), 2 * step);
+        alb_bends lowest;
+        const bool ok = alb_slice(&lowest, solid, from, to, turned(up, along, angle));
+        const double before = bends->length_mm;
+        alb_vector best = up;
+        for (int k = 0; k < 2; k++)
+            if (length[k] < bends->length_mm)
+                *bends = other[k], best = turned(up, along, k ? step : -step);
+        if (ok && lowest.length_mm < bends->length_mm)
+            *bends = lowest, best = turned(up, along, angle);
+        up = best;
+        if (bends->length_mm > (1 - 1e-3) * before)
+            break;
+    }
+    return true;
+}
+
+bool alb_slice_any(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to)
+{
+    enum { PLANES = 8 };
+    const alb_vector along = alb_unit(alb_sub(to, from));
+    alb_vector up, other, best = {0};
+    double least = (double)INFINITY;
+    alb_tangents(&up, &other, along);
+    for (int k = 0; k < PLANES; k++) {
+        const alb_vector towards = turned(up, along, 2 * M_PI * k / PLANES);
+        if (alb_slice(bends, solid, from, to, towards) && bends->length_mm < least)
+            least = bends->length_mm, best = towards;
+    }
+    return least < (double)INFINITY && alb_slice_best(bends, solid, from, to, best);
+}
+
+bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, alb_vector from, alb_vector to)
+{
+    alb_crossing crossings[CROSSINGS];
+    const size_t count = alb_voxels_crossings(crossings, CROSSINGS, &solid->voxels, from, to);
+    if (count < 2 || count > CROSSINGS || !crossings[0].leaves || crossings[count - 1].leaves)
+        return false;
+    const alb_vector sum =
+        alb_add(solid->net.normals[crossings[0].triangle], solid->net.normals[crossings[count - 1].triangle]);
+    const alb_vector along = alb_unit(alb_sub(to, from));
+    *towards = alb_sub(alb_times(alb_dot(sum, along), along), sum);
+    return alb_dot(*towards, *towards) > 1e-6;
+}
