@@ -3,7 +3,7 @@
 //     integral s(|x - p|) dA = sum over edges  sign(d) integral [P(sqrt(h^2 + rho^2)) - P(h)] dtheta,
 //     P(r) = integral_0^r s(r) r dr
 // Along an edge, at t from the perpendicular, t = |d| sinh w: rho = |d| cosh w, dtheta = dw / cosh w. In w the profile
-// turns over within a step of about one, however narrow it is, and Gauss-Legendre with five points an edge does: 1e-4
+// turns over within a step of about one, however narrow it is, and Gauss-Legendre with five points an edge does: 1e-3
 // of the row's sum for well-shaped triangles, 1.5e-2 at worst where w goes to 5 (aspect 100). The weights of an
 // edge are scaled to the angle that it spans, so that of a profile that ends inside the patch nothing is lost.
 //
