@@ -26,10 +26,17 @@ static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *er
     memset(s->irradiance, 0, n * sizeof *s->irradiance);
     for (size_t p = 0; p < n; p++)
         memcpy(s->exitance[p], scene->surfaces[scene->mesh.groups[p]].exitance, sizeof s->exitance[p]);
-    for (size_t i = 0; i < scene->light_count; i++)
-        if (!alb_light_add(s->irradiance, &scene->lights[i], &s->patches, &s->tracer, &s->factors, scene->seed,
-                           UINT64_MAX - i, error))
-            return false;
+    alb_progress progress;
+    bool ok = true;
+    alb_progress_begin(&progress, "lights", (long)scene->light_count);
+    for (size_t i = 0; ok && i < scene->light_count; i++) {
+        ok = alb_light_add(s->irradiance, &scene->lights[i], &s->patches, &s->tracer, &s->factors, scene->seed,
+                           UINT64_MAX - i, error);
+        alb_progress_at(&progress, (long)i + 1);
+    }
+    alb_progress_end(&progress);
+    if (!ok)
+        return false;
     s->lamps_direct = alb_lamps_are_small(&s->patches, (const double(*)[3])s->exitance);
     return !s->lamps_direct || alb_lamps_add(s->irradiance, (const double(*)[3])s->exitance, &s->patches, &s->tracer,
                                              scene->seed, UINT64_MAX - ALB_LIGHTS_MAX, error);
