@@ -8,37 +8,55 @@
 #include <stdlib.h>
 #include <string.h>
 
+typedef float float4 __attribute__((vector_size(16)));
 typedef float float8 __attribute__((vector_size(32)));
+typedef int8_t byte4 __attribute__((vector_size(4)));
 
-// Light and its moment along the direction, R, G, B and a zero each.
+// Light of a part and its moment along the direction, R, G and B each; what follows them meets zeros in the tables.
 static inline void take_node(float8 *light, const alb_scatter_node *node, const int8_t direction[4], float share)
 {
-    typedef float float4 __attribute__((vector_size(16)));
-    float4 axes[3], along = {0};
+    float4 all, axes[3];
+    byte4 bytes;
+    memcpy(&all, node, sizeof all);
     memcpy(axes, node->moments, sizeof axes);
-    for (int k = 0; k < 3; k++)
-        along += (float)direction[k] * (1.0F / INT8_MAX) * axes[k];
-    *light = (float8){
-        share * node->light[0], share * node->light[1], share * node->light[2], 0, along[0], along[1], along[2], 0};
+    memcpy(&bytes, direction, sizeof bytes);
+    const float4 to = __builtin_convertvector(bytes, float4) * (1.0F / INT8_MAX);
+    const float4 along = to[0] * axes[0] + to[1] * axes[1] + to[2] * axes[2];
+    *light = __builtin_shufflevector(share * all, along, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-// rows += (table[code] + spread table[code] bent) light, for the rows of a block.
-ALB_VECTOR_CLONES
-static void add_run(double sums[ALB_BLOCK][3], const float (*table)[16], const alb_scatter_node *node,
-                    const uint16_t *deltas, const uint8_t *codes, const int8_t (*directions)[4], size_t count,
-                    const alb_level *level)
+static inline float variance_of(const alb_scatter_node *node, const int8_t direction[4], const alb_level *level)
+{
+    return level->spread * node->spread_mm2 * (1.0F / 64) * (float)direction[3];
+}
+
+// Where a run is read.
+typedef struct stretch {
+    const float (*table)[16];
+    const alb_scatter_node *node;
+    const uint16_t *deltas;
+    const uint8_t *codes;
+    const int8_t (*directions)[4];
+    size_t count;
+    const alb_level *level;
+} stretch;
+
+// rows += (value + v bend) light, for the rows of a block; `parts` is the level's, told apart for the compiler.
+static inline __attribute__((always_inline)) void add_links(double sums[ALB_BLOCK][3], const stretch *run, int parts)
 {
     float8 rows[ALB_BLOCK] = {{0}};
-    for (size_t k = 0; k < count; k++) {
+    const alb_scatter_node *node = run->node;
+    const uint8_t *codes = run->codes;
+    for (size_t k = 0; k < run->count; k++) {
         float8 light, value, bend;
-        node += deltas[k];
-        take_node(&light, node, directions[k], 1 / (float)level->parts);
-        const float v = level->spread * node->spread_mm2 * (float)directions[k][3] / 64;
-        for (int part = 0; part < level->parts; part++, codes += ALB_BLOCK)
+        node += run->deltas[k];
+        take_node(&light, node, run->directions[k], 1 / (float)parts);
+        const float v = variance_of(node, run->directions[k], run->level);
+        for (int part = 0; part < parts; part++, codes += ALB_BLOCK)
 #pragma GCC unroll 8
             for (int row = 0; row < ALB_BLOCK; row++) {
-                memcpy(&value, table[codes[row]], sizeof value);
-                memcpy(&bend, table[codes[row]] + 8, sizeof bend);
+                memcpy(&value, run->table[codes[row]], sizeof value);
+                memcpy(&bend, run->table[codes[row]] + 8, sizeof bend);
                 rows[row] += (value + v * bend) * light;
             }
     }
@@ -47,29 +65,36 @@ static void add_run(double sums[ALB_BLOCK][3], const float (*table)[16], const a
             sums[row][c] += (double)(rows[row][c] + rows[row][4 + c]);
 }
 
-// What one run finds in the block's deltas and codes, and steps past.
-typedef struct cursor {
-    const uint16_t *deltas;
-    const uint8_t *codes;
-    const int8_t (*directions)[4];
-} cursor;
-
-static cursor begin(const alb_link_block *block)
+ALB_VECTOR_CLONES
+static void add_run(double sums[ALB_BLOCK][3], const stretch *run)
 {
-    return (cursor){block->deltas, block->codes, (const int8_t(*)[4])block->directions};
+    if (run->level->parts == 1)
+        add_links(sums, run, 1);
+    else
+        add_links(sums, run, run->level->parts);
 }
 
-static void step(cursor *at, const alb_link_run *run)
+static stretch begin(const alb_link_block *block)
 {
-    at->deltas += run->count;
-    at->directions += run->count;
-    at->codes += (size_t)run->count * (size_t)(ALB_BLOCK * alb_levels[run->level].parts);
+    return (stretch){
+        .deltas = block->deltas, .codes = block->codes, .directions = (const int8_t(*)[4])block->directions};
 }
 
-static const float (*table_of(const alb_scatter_kernel *kernels, const alb_link_run *run))[16]
+// Points the stretch at the run.
+static void take(stretch *at, const alb_link_run *run, const alb_forest *forest, const alb_scatter_kernel *kernels)
 {
-    return (const float(*)[16])kernels[run->kernel].values +
-           (size_t)(run->octave - kernels[run->kernel].first_used) * ALB_CODES;
+    const alb_scatter_kernel *kernel = &kernels[run->kernel];
+    at->table = (const float(*)[16])kernel->values + (size_t)(run->octave - kernel->first_used) * ALB_CODES;
+    at->node = forest->nodes + run->first;
+    at->count = run->count;
+    at->level = &alb_levels[run->level];
+}
+
+static void pass(stretch *at)
+{
+    at->deltas += at->count;
+    at->directions += at->count;
+    at->codes += at->count * (size_t)(ALB_BLOCK * at->level->parts);
 }
 
 static void add_pairs(double sums[ALB_BLOCK][3], const alb_link_block *block, const alb_forest *forest,
@@ -100,11 +125,11 @@ void alb_product_add(double (*out)[3], const alb_links *links, const alb_forest 
     for (size_t b = 0; b < links->block_count; b++) {
         const alb_link_block *block = &links->blocks[b];
         double sums[ALB_BLOCK][3] = {{0}};
-        cursor at = begin(block);
-        for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; step(&at, run++)) {
+        stretch at = begin(block);
+        for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; pass(&at), run++) {
+            take(&at, run, forest, kernels);
             if (sides & 1U << kernels[run->kernel].side)
-                add_run(sums, table_of(kernels, run), forest->nodes + run->first, at.deltas, at.codes, at.directions,
-                        run->count, &alb_levels[run->level]);
+                add_run(sums, &at);
         }
         add_pairs(sums, block, forest, kernels, sides);
         for (uint32_t row = 0; row < block->row_count; row++)
@@ -118,35 +143,43 @@ typedef struct column {
     float value[3], change[3][3]; // change along x, y, z
 } column;
 
+ALB_VECTOR_CLONES
+static void send_run(column *to, const stretch *run, const float areas[ALB_BLOCK])
+{
+    const alb_scatter_node *node = run->node;
+    const uint8_t *codes = run->codes;
+    for (size_t k = 0; k < run->count; k++) {
+        float8 sum = {0}, value, bend;
+        node += run->deltas[k];
+        to += run->deltas[k];
+        const float v = variance_of(node, run->directions[k], run->level), share = 1 / (float)run->level->parts;
+        for (int part = 0; part < run->level->parts; part++, codes += ALB_BLOCK)
+#pragma GCC unroll 8
+            for (int row = 0; row < ALB_BLOCK; row++) {
+                memcpy(&value, run->table[codes[row]], sizeof value);
+                memcpy(&bend, run->table[codes[row]] + 8, sizeof bend);
+                sum += (value + v * bend) * areas[row];
+            }
+        for (int c = 0; c < 3; c++) {
+            to->value[c] += sum[c] * share;
+            for (int axis = 0; axis < 3; axis++)
+                to->change[axis][c] += sum[4 + c] * (float)run->directions[k][axis] * (1.0F / INT8_MAX);
+        }
+    }
+}
+
 static void add_block_columns(column *columns, const alb_link_block *block, const alb_forest *forest,
                               const alb_scatter_kernel *kernels)
 {
-    const float *areas = forest->areas_mm2 + block->first_leaf;
+    float areas[ALB_BLOCK] = {0};
+    memcpy(areas, forest->areas_mm2 + block->first_leaf, block->row_count * sizeof *areas);
     for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++)
         for (int c = 0; c < 3; c++)
             columns[pair->node].value[c] += areas[pair->row] * pair->weights[c];
-    cursor at = begin(block);
-    for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; step(&at, run++)) {
-        const float(*table)[16] = table_of(kernels, run);
-        const uint8_t *codes = at.codes;
-        const alb_level *level = &alb_levels[run->level];
-        size_t node = run->first;
-        for (uint32_t k = 0; k < run->count; k++) {
-            float8 sum = {0}, value, bend;
-            node += at.deltas[k];
-            const float v = level->spread * forest->nodes[node].spread_mm2 * (float)at.directions[k][3] / 64;
-            for (int part = 0; part < level->parts; part++, codes += ALB_BLOCK)
-                for (uint32_t row = 0; row < block->row_count; row++) {
-                    memcpy(&value, table[codes[row]], sizeof value);
-                    memcpy(&bend, table[codes[row]] + 8, sizeof bend);
-                    sum += (value + v * bend) * areas[row];
-                }
-            for (int c = 0; c < 3; c++) {
-                columns[node].value[c] += sum[c] / (float)level->parts;
-                for (int axis = 0; axis < 3; axis++)
-                    columns[node].change[axis][c] += sum[4 + c] * (float)at.directions[k][axis] / INT8_MAX;
-            }
-        }
+    stretch at = begin(block);
+    for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; pass(&at), run++) {
+        take(&at, run, forest, kernels);
+        send_run(columns + run->first, &at, areas);
     }
 }
 
