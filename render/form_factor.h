@@ -62,7 +62,7 @@ void alb_form_factors_half_difference(double (*out)[3], const alb_form_factors *
 bool alb_form_factors_error(double *percent, const alb_form_factors *factors, const double (*radiosity)[3],
                             const double sky[3], alb_error *error);
 // Casts rows again with as many rays as bring that error to `percent`, for light like `radiosity` (a first solution),
-// more where the halves differ more, and never fewer than they have or more than rays_max. *reached (may be NULL) is
+// more where the halves differ more, and never fewer than `rays` or more than rays_max. *reached (may be NULL) is
 // the error that the new rows state. It fails as create does; the rows are then what they were.
 bool alb_form_factors_refine(double *reached, alb_form_factors *factors, const alb_patches *patches,
                              const alb_tracer *tracer, const double (*radiosity)[3], const double sky[3],
