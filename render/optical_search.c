@@ -16,13 +16,15 @@ typedef struct alb_heap_entry {
     uint32_t node;
 } heap_entry;
 
-bool alb_search_create(alb_search *search, size_t nodes, alb_error *error)
+bool alb_search_create(alb_search *search, const alb_turns *turns, alb_error *error)
 {
-    *search = (alb_search){.source = UINT32_MAX, .heap_capacity = 16 * nodes + 4096};
+    const size_t nodes = turns->count;
+    *search = (alb_search){.source = UINT32_MAX, .shared_source = UINT32_MAX, .heap_capacity = 16 * nodes + 4096};
     if ((search->parents = alb_allocate(nodes, sizeof *search->parents, error)) &&
         (search->stamps = alb_allocate(nodes, sizeof *search->stamps, error)) &&
         (search->lengths = alb_allocate(nodes, sizeof *search->lengths, error)) &&
         (search->states = alb_allocate(nodes, 1, error)) &&
+        (search->shared = alb_allocate(turns->surface_count, sizeof *search->shared, error)) &&
         (search->heap = alb_allocate(search->heap_capacity, sizeof *search->heap, error)))
         return true;
     alb_search_free(search);
@@ -35,6 +37,7 @@ void alb_search_free(alb_search *search)
     free(search->stamps);
     free(search->lengths);
     free(search->states);
+    free(search->shared);
     free(search->heap);
     *search = (alb_search){0};
 }
@@ -209,7 +212,6 @@ void alb_search_run(alb_search *search, const alb_optical_solid *solid, uint32_t
 {
     const float limit = (float)(solid->reach_mm + 2 * solid->turns.size_mm);
     search->source = source;
-    search->searches++;
     if (++search->stamp == 0) {
         memset(search->stamps, 0, solid->turns.count * sizeof *search->stamps);
         search->stamp = 1;
