@@ -148,7 +148,8 @@ bool alb_optical_workspace_create(alb_optical_workspace *work, const alb_optical
     *work = (alb_optical_workspace){0};
     if (!(work->memory = alb_allocate(1, sizeof *work->memory, error)))
         return false;
-    if ((paths->kind == ALB_OPTICAL_SOLID && !alb_search_create(&work->memory->search, &paths->solid->turns, error)) ||
+    if ((paths->kind == ALB_OPTICAL_SOLID &&
+         !alb_search_create(&work->memory->search, paths->solid->turns.count, error)) ||
         (paths->kind == ALB_OPTICAL_SHEET &&
          !alb_geodesic_memory_create(&work->memory->sheet.geodesic, &paths->sheet->surface, error))) {
         alb_optical_workspace_free(work);

@@ -6,7 +6,7 @@
 #include <string.h>
 
 enum { ROUNDS = 3 };
-static const double worth_another_round = 1e-3; // relative gain of the last
+static const double worth_another_round = 3e-4; // relative gain of the last
 
 // Leaves out corners whose neighbours see each other.
 static bool shorten(alb_bends *path, const alb_optical_solid *solid)

@@ -16,15 +16,13 @@ typedef struct alb_heap_entry {
     uint32_t node;
 } heap_entry;
 
-bool alb_search_create(alb_search *search, const alb_turns *turns, alb_error *error)
+bool alb_search_create(alb_search *search, size_t nodes, alb_error *error)
 {
-    const size_t nodes = turns->count;
-    *search = (alb_search){.source = UINT32_MAX, .shared_source = UINT32_MAX, .heap_capacity = 16 * nodes + 4096};
+    *search = (alb_search){.source = UINT32_MAX, .heap_capacity = 16 * nodes + 4096};
     if ((search->parents = alb_allocate(nodes, sizeof *search->parents, error)) &&
         (search->stamps = alb_allocate(nodes, sizeof *search->stamps, error)) &&
         (search->lengths = alb_allocate(nodes, sizeof *search->lengths, error)) &&
         (search->states = alb_allocate(nodes, 1, error)) &&
-        (search->shared = alb_allocate(turns->surface_count, sizeof *search->shared, error)) &&
         (search->heap = alb_allocate(search->heap_capacity, sizeof *search->heap, error)))
         return true;
     alb_search_free(search);
@@ -37,7 +35,6 @@ void alb_search_free(alb_search *search)
     free(search->stamps);
     free(search->lengths);
     free(search->states);
-    free(search->shared);
     free(search->heap);
     *search = (alb_search){0};
 }

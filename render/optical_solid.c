@@ -11,8 +11,6 @@
 // A section that is longer than this times its chord is compared with the graph's path; and how much longer than the
 // section that may be before it is pulled, for pulling to gain so much is rare.
 static const double trusted_detour = 1.2, worth_pulling = 1.15;
-// In voxels of the graph: from patch to patch within `near`; corners of shared paths as far as `leg` from their ends.
-static const double near = 3, leg = 1;
 enum { FINE_VOXELS = 6000000, TOUCHES = 16 };
 
 static bool fill_starts(alb_optical_solid *solid, alb_error *error)
@@ -127,82 +125,14 @@ static bool only_touches(const alb_optical_solid *solid, alb_vector start, alb_v
     return inside > 0 && out * alb_length(alb_sub(end, start)) < 4 * solid->lift_mm;
 }
 
-static double leg_of(const alb_optical_solid *solid, alb_vector from, alb_vector to)
-{
-    alb_bends section;
-    alb_vector towards;
-    if (alb_voxels_inside(&solid->voxels, from, to))
-        return alb_length(alb_sub(to, from));
-    if (alb_slice_direction(&towards, solid, from, to) && alb_slice(&section, solid, from, to, towards))
-        return section.length_mm;
-    return (double)INFINITY;
-}
-
-// The path that two pieces of surface share: its middle part, between the first and the last corner that lie a leg away
-// from the ends, or the one that comes nearest to that.
-static void share(alb_shared_path *shared, alb_search *search, const alb_optical_solid *solid, uint32_t source,
-                  uint32_t target)
-{
-    const alb_vector start = node_at(&solid->turns, source), end = node_at(&solid->turns, target);
-    alb_bends path;
-    shared->known = false;
-    if (alb_voxels_inside(&solid->voxels, start, end))
-        return;
-    go_around(&path, search, solid, source, target, start, end);
-    if (!(path.length_mm < (double)INFINITY) || path.count < 3)
-        return;
-    double sum = 0, so_far[ALB_BENDS_MAX] = {0}, best = -1;
-    for (int i = 1; i < path.count; i++)
-        so_far[i] = sum += alb_length(alb_sub(path.at[i], path.at[i - 1]));
-    int first = 0, last = 0, most = 1;
-    for (int i = 1; i + 1 < path.count; i++) {
-        const double before = so_far[i], after = sum - so_far[i], reserve = leg * solid->turns.size_mm;
-        if (fmin(before, after) > best)
-            best = fmin(before, after), most = i;
-        if (before >= reserve && after >= reserve)
-            first = first ? first : i, last = i;
-    }
-    first = first ? first : most, last = last ? last : most;
-    // The lengths of corners on the surface, not of those lifted off it.
-    const double scale = path.length_mm / sum;
-    *shared =
-        (alb_shared_path){path.at[first], path.at[last], scale * (so_far[last] - so_far[first]), search->sharing, true};
-}
-
-// By the path that the two pieces of surface share; INFINITY where that does not serve.
-static double shared_length(alb_vector *last, alb_search *search, const alb_optical_solid *solid, uint32_t from,
-                            uint32_t to)
-{
-    const uint32_t source = solid->turns.of_triangle[from], target = solid->turns.of_triangle[to];
-    const alb_vector a = node_at(&solid->turns, source), b = node_at(&solid->turns, target);
-    if (alb_length(alb_sub(a, b)) < near * solid->turns.size_mm)
-        return (double)INFINITY;
-    if (search->shared_source != source)
-        search->shared_source = source, search->sharing++;
-    alb_shared_path *shared = &search->shared[target];
-    if (shared->stamp != search->sharing) {
-        share(shared, search, solid, source, target);
-        shared->stamp = search->sharing;
-    }
-    if (!shared->known)
-        return (double)INFINITY;
-    *last = shared->last;
-    return leg_of(solid, solid->starts[from], shared->first) + shared->length_mm +
-           leg_of(solid, shared->last, solid->starts[to]);
-}
-
 double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *solid, uint32_t from, uint32_t to,
                                  alb_vector point)
 {
     const alb_vector start = solid->starts[from], end = solid->starts[to], middle = solid->net.middles[to];
     if (from == to || alb_voxels_inside(&solid->voxels, start, end) || only_touches(solid, start, end))
         return alb_length(alb_sub(point, solid->net.middles[from]));
-    alb_vector last;
-    double length = shared_length(&last, search, solid, from, to);
-    if (!(length < (double)INFINITY)) {
-        alb_bends path;
-        go_around(&path, search, solid, solid->turns.of_triangle[from], solid->turns.of_triangle[to], start, end);
-        length = path.length_mm, last = path.at[path.count - 2];
-    }
-    return length - alb_length(alb_sub(middle, last)) + alb_length(alb_sub(point, last));
+    alb_bends path;
+    go_around(&path, search, solid, solid->turns.of_triangle[from], solid->turns.of_triangle[to], start, end);
+    const alb_vector last = path.at[path.count - 2];
+    return path.length_mm - alb_length(alb_sub(middle, last)) + alb_length(alb_sub(point, last));
 }

@@ -50,14 +50,6 @@ typedef struct alb_optical_solid {
 bool alb_turns_create(alb_turns *turns, const alb_optical_solid *solid, double size_mm, alb_error *error);
 void alb_turns_free(alb_turns *turns);
 
-// The middle part of the path between two pieces of surface.
-typedef struct alb_shared_path {
-    alb_vector first, last;
-    double length_mm;
-    uint32_t stamp;
-    bool known;
-} alb_shared_path;
-
 // The search from one node: length and parent of every node within reach.
 typedef struct alb_search {
     uint32_t source, *parents, *stamps, stamp;
@@ -65,10 +57,8 @@ typedef struct alb_search {
     unsigned char *states;
     struct alb_heap_entry *heap;
     size_t heap_count, heap_capacity;
-    uint32_t shared_source, sharing; // paths shared from this piece of surface; their stamp
-    alb_shared_path *shared;         // to each other
 } alb_search;
-bool alb_search_create(alb_search *search, const alb_turns *turns, alb_error *error);
+bool alb_search_create(alb_search *search, size_t nodes, alb_error *error);
 void alb_search_free(alb_search *search);
 // Whether the last search got there.
 bool alb_search_found(const alb_search *search, uint32_t node);
