@@ -148,6 +148,8 @@ static bool print_json(const alb_scene *scene, const alb_solution *s, double vie
     alb_json_integer(&json, "turned_faces", (long)scene->mesh.turned);
     alb_json_integer(&json, "culled_patches", (long)s->patches.culled);
     alb_json_integer(&json, "rays_per_patch", s->factors.rays);
+    alb_json_integer(&json, "rays", (long)s->factors.rows.first[s->patches.count]);
+    alb_json_integer(&json, "rays_cast_again", (long)s->factors.reshot_rays);
     alb_json_integer(&json, "iterations", s->report.iterations);
     alb_json_number(&json, "residual", s->report.residual);
     alb_json_number(&json, "radiosity_bound_percent", 100 * s->bound);
@@ -213,11 +215,13 @@ done:
 static bool run(int argc, char **argv, alb_error *error)
 {
     outputs out = {0};
+    const char *stated = NULL;
     const alb_option options[] = {
         {.label = "SCENE.json", .required = true, .value = &out.scene},
         {.name = "-o", .required = true, .value = &out.picture},
         {.name = "--mesh", .value = &out.mesh},
         {.name = "--png", .value = &out.png},
+        {.name = "--error", .value = &stated},
         {.name = "--json", .flag = &out.json},
     };
     alb_scene scene = {0};
@@ -225,9 +229,11 @@ static bool run(int argc, char **argv, alb_error *error)
     if (!alb_options_read(options, sizeof options / sizeof *options, argc, argv, error) ||
         !check_targets(&out, error) || !alb_scene_read(&scene, &provenance, out.scene, error))
         return false;
-    snprintf(provenance.options, sizeof provenance.options, "rays_per_patch %d, residual %g, seed %llu",
-             scene.rays_per_patch, scene.residual, (unsigned long long)scene.seed);
-    const bool ok = render(&out, &scene, &provenance, error);
+    const bool given = !stated || alb_option_number(&scene.error_percent, "--error", stated, 0.01, 100, error);
+    snprintf(provenance.options, sizeof provenance.options,
+             "rays_per_patch %d, error_percent %g, residual %g, seed %llu", scene.rays_per_patch, scene.error_percent,
+             scene.residual, (unsigned long long)scene.seed);
+    const bool ok = given && render(&out, &scene, &provenance, error);
     alb_scene_free(&scene);
     return ok;
 }
@@ -236,14 +242,16 @@ const alb_command alb_render_command = {
     .name = "render",
     .summary = "render a scene of translucent and opaque meshes",
     .usage =
-        "alabaster render SCENE.json -o PICTURE.exr [--png PICTURE.png] [--mesh OUT.ply] [--json]\n"
+        "alabaster render SCENE.json -o PICTURE.exr [--png PICTURE.png] [--mesh OUT.ply] [--error PERCENT] [--json]\n"
         "\n"
         "Solves B = (I - S F)^-1 (S E + M) on the scene's meshes and writes linear radiance as EXR and, beside it,\n"
         "a PNG whose exposure shows the brightest hundredth of what is lit at 0.9.\n"
         "  -o PICTURE.exr     the picture: channels R, G, B\n"
         "  --png PICTURE.png  where the PNG goes instead of PICTURE.png\n"
         "  --mesh OUT.ply     the mesh with the radiosity of each face (red, green, blue, float)\n"
-        "  --json             patches, products, residual, row sums, balance of flux, seconds and bytes per stage\n"
+        "  --error PERCENT    rays until the irradiance by rays errs by no more than this, rms; for error_percent\n"
+        "  --json             patches, rays, products, residual, row sums, balance of flux, seconds and bytes per "
+        "stage\n"
         "The scene file is described in render/scene.h.\n",
     .run = run,
 };

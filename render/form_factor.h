@@ -53,16 +53,16 @@ alb_vector alb_form_factors_direction(const alb_form_factors *factors, const alb
 void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3]);
 
 // --- the error of the rows -------------------------------------------------------------------------------------------
-// out = (F_even - F_odd) radiosity / 2, the halves of the rays apart: its rms over the patches is the rms error of
-// F radiosity, a little above it for lattices. sky (may be NULL) is the sky's even radiosity, pi times its radiance.
+// out = (F_even - F_odd) radiosity / 2, the halves of the rays apart: its rms over the patches is the rms
+// error of F radiosity, or a little above it. sky (may be NULL) is the sky's even radiosity, pi times its radiance.
 void alb_form_factors_half_difference(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3],
                                       const double sky[3]);
-// rms error over the patches in percent of the rms irradiance, the worst channel; 0 where all is black. NAN where a
-// patch has a single ray and so no halves.
+// rms error over the patches in percent of the rms irradiance, the worst channel, as a bound that holds in 95 % of
+// draws of the rays; 0 where all is black. NAN where a patch has a single ray and so no halves.
 bool alb_form_factors_error(double *percent, const alb_form_factors *factors, const double (*radiosity)[3],
                             const double sky[3], alb_error *error);
 // Casts rows again with as many rays as bring that error to `percent`, for light like `radiosity` (a first solution),
-// more where the halves differ more, and never fewer than they have or more than rays_max. *reached (may be NULL) is
+// more where the halves differ more, and never fewer than `rays` or more than rays_max. *reached (may be NULL) is
 // the error that the new rows state. It fails as create does; the rows are then what they were.
 bool alb_form_factors_refine(double *reached, alb_form_factors *factors, const alb_patches *patches,
                              const alb_tracer *tracer, const double (*radiosity)[3], const double sky[3],

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIZE = 16, CLUSTERS_MAX = 60000 };
+enum { MEMBERS = 16, CLUSTERS_MAX = 60000 };
 static const double coarse_residual = 0.03;
 
 typedef struct placed {
@@ -62,7 +62,7 @@ static void place(placed *out, const alb_patches *patches)
 // Numbers the clusters in the order of the sorted patches, none across materials or directions.
 static size_t cut(uint16_t *cluster, const placed *sorted, size_t n)
 {
-    const size_t size = n / (CLUSTERS_MAX / 2) > SIZE ? n / (CLUSTERS_MAX / 2) : SIZE;
+    const size_t size = n / (CLUSTERS_MAX / 2) > MEMBERS ? n / (CLUSTERS_MAX / 2) : MEMBERS;
     size_t count = 0, held = 0;
     for (size_t k = 0; k < n; k++) {
         if (k && (held == size || sorted[k].key >> 32 != sorted[k - 1].key >> 32)) {
@@ -179,7 +179,7 @@ ALB_VECTOR_CLONES
 static void gather(alb_rgb *out, const alb_clusters *clusters)
 {
     typedef float float4 __attribute__((vector_size(16)));
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (clusters->count > 256)
     for (size_t k = 0; k < clusters->count; k++) {
         const uint16_t *hits = clusters->hits + k * ALB_CLUSTER_RAYS;
         float4 sum = {0}, value;
@@ -215,7 +215,7 @@ void alb_clusters_solve(alb_rgb *x, const alb_clusters *clusters, const alb_rgb 
     if (!alb_solver_run(clusters->found, &report, ALB_SOLVER_GMRES, &coarse, (const alb_rgb *)clusters->right, NULL,
                         coarse_residual, NULL))
         memset(clusters->found, 0, clusters->count * sizeof *clusters->found); // no memory: as without this level
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (clusters->patch_count > 8192)
     for (size_t p = 0; p < clusters->patch_count; p++)
         for (int c = 0; c < 3; c++)
             x[p][c] = right[p][c] + clusters->sums[p][c] * clusters->found[clusters->cluster[p]][c];

@@ -146,7 +146,7 @@ static bool run_with(alb_run *run, bool coarse, alb_error *error)
         while (steps < RESTART && report->iterations < ALB_PRODUCTS_MAX - 1 &&
                report->history[report->iterations - 1] > 0.98 * run->wanted);
         update(run, s, steps);
-        over = alb_run_residual(run) || (report->residual <= ALB_RESIDUAL_LEAST && report->residual > 0.5 * before);
+        over = alb_run_residual(run) || (report->residual <= run->floor && report->residual > 0.5 * before);
     }
     ok = true;
 done:

@@ -38,10 +38,12 @@ void alb_run_note(alb_run *run, double residual)
 
 bool alb_run_residual(alb_run *run)
 {
-    double length[3];
+    double length[3], size[3];
     run->bounce->apply(run->residual, run->bounce->data, (const alb_rgb *)run->x);
     alb_space_residual(length, run->report->residual_flux, &run->space, run->residual, run->right,
                        (const alb_rgb *)run->x);
+    alb_space_norm(size, &run->space, (const alb_rgb *)run->x);
+    run->floor = ALB_RESIDUAL_LEAST * fmax(1, alb_run_worst(run, size));
     run->report->residual = alb_run_worst(run, length);
     alb_run_note(run, run->report->residual);
     return run->report->residual <= run->wanted || run->report->iterations >= ALB_PRODUCTS_MAX;
@@ -160,7 +162,7 @@ bool alb_solver_run(alb_rgb *x, alb_radiosity_report *report, alb_solver solver,
     }
     if (ok && report->iterations)
         add_residual(&run); // the last bounce
-    if (ok && !(report->residual <= fmax(residual, ALB_RESIDUAL_LEAST)))
+    if (ok && !(report->residual <= fmax(residual, run.floor)))
         ok = alb_fail(error, ALB_INTERNAL, "radiosity: residual %.3g after %d products of %s, asked for %.3g",
                       report->residual, report->iterations, alb_solver_names[solver], residual);
     alb_space_free(&run.space);

@@ -13,7 +13,8 @@ typedef enum alb_solver {
 } alb_solver;
 extern const char *const alb_solver_names[ALB_SOLVERS]; // "jacobi", "gauss_seidel", ...
 
-// Products of single precision hold 1e-7 or so: a smaller residual than this is not promised where it is asked for.
+// Products of single precision hold 1e-7 or so: a smaller residual than this, times |x| / |b|, is not promised where it
+// is asked for.
 #define ALB_RESIDUAL_LEAST 1e-6
 enum { ALB_PRODUCTS_MAX = 500 };
 
@@ -37,7 +38,7 @@ typedef struct alb_radiosity_report {
     double history[ALB_PRODUCTS_MAX + 1]; // residual after each product
 } alb_radiosity_report;
 
-// Solves to the relative residual, or as near as rounding lets it come below ALB_RESIDUAL_LEAST. start (may be NULL) is
+// Solves to the relative residual, or as near as rounding lets it come (ALB_RESIDUAL_LEAST). start (may be NULL) is
 // a guess, and costs one product. ALB_INTERNAL with the numbers where ALB_PRODUCTS_MAX products do not reach it;
 // ALB_USAGE where the solver lacks what it needs of the bounce.
 bool alb_solver_run(alb_rgb *x, alb_radiosity_report *report, alb_solver solver, const alb_bounce *bounce,
@@ -49,8 +50,8 @@ typedef struct alb_run {
     const alb_rgb *right;
     alb_space space;
     alb_rgb *x, *residual;
-    double scale[3]; // |b|
-    double wanted;
+    double scale[3];      // |b|
+    double wanted, floor; // residual asked for; below which rounding has the say
     alb_radiosity_report *report;
 } alb_run;
 

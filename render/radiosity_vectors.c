@@ -26,6 +26,9 @@ void alb_space_free(alb_space *space)
 
 static size_t blocks_of(const alb_space *space) { return (space->count + ROWS - 1) / ROWS; }
 
+// Below this many rows a second thread costs more than it brings.
+static bool is_large(const alb_space *space) { return space->count > 8192; }
+
 static size_t rows_of(const alb_space *space, size_t block)
 {
     const size_t left = space->count - block * ROWS;
@@ -83,7 +86,7 @@ static void gather(double (*out)[3], const alb_space *space, int count)
 
 void alb_space_dots(double (*out)[3], const alb_space *space, const alb_rgb *a, alb_rgb *const *b, int count)
 {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (is_large(space))
     for (size_t block = 0; block < blocks_of(space); block++) {
         double weighed[ROWS][3];
         const size_t first = block * ROWS, rows = rows_of(space, block);
@@ -112,7 +115,7 @@ static void square_block(const alb_space *space, size_t block, const alb_rgb *a)
 void alb_space_add(double norm[3], const alb_space *space, alb_rgb *a, const double (*factors)[3], alb_rgb *const *b,
                    int count)
 {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (is_large(space))
     for (size_t block = 0; block < blocks_of(space); block++) {
         const size_t first = block * ROWS, rows = rows_of(space, block);
         for (int k = 0; k < count; k++)
@@ -128,7 +131,7 @@ void alb_space_add(double norm[3], const alb_space *space, alb_rgb *a, const dou
 
 void alb_space_scale(const alb_space *space, alb_rgb *a, const double factor[3])
 {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (is_large(space))
     for (size_t i = 0; i < space->count; i++)
         for (int c = 0; c < 3; c++)
             a[i][c] *= factor[c];
@@ -148,7 +151,7 @@ void alb_space_residual(double norm[3], double mean[3], const alb_space *space, 
                         const alb_rgb *x)
 {
     double sums[2][3];
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (is_large(space))
     for (size_t block = 0; block < blocks_of(space); block++) {
         const size_t first = block * ROWS, rows = rows_of(space, block);
         for (size_t i = first; i < first + rows; i++)
@@ -165,7 +168,7 @@ void alb_space_residual(double norm[3], double mean[3], const alb_space *space, 
 
 void alb_space_norm(double out[3], const alb_space *space, const alb_rgb *a)
 {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (is_large(space))
     for (size_t block = 0; block < blocks_of(space); block++)
         square_block(space, block, a);
     gather((double(*)[3])out, space, 1);
@@ -174,7 +177,7 @@ void alb_space_norm(double out[3], const alb_space *space, const alb_rgb *a)
 
 void alb_space_mean(double out[3], const alb_space *space, const alb_rgb *a)
 {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (is_large(space))
     for (size_t block = 0; block < blocks_of(space); block++)
         mean_block(space, block, 0, a);
     gather((double(*)[3])out, space, 1);

@@ -161,13 +161,17 @@ static bool read_camera(alb_scene_reader *in, alb_node root)
 
 static bool read_settings(alb_scene *scene, alb_node root, alb_error *error)
 {
-    long rays = 256, seed = 1;
+    const bool stated = alb_node_has(root, "error_percent");
+    long rays = stated ? 64 : 256, seed = 1, memory_mb = 4096;
     scene->residual = 1e-4;
-    if ((alb_node_has(root, "rays_per_patch") && !alb_node_integer(&rays, root, "rays_per_patch", 1, 65536, error)) ||
+    if ((stated && !alb_node_number(&scene->error_percent, root, "error_percent", 0.01, 100, error)) ||
+        (alb_node_has(root, "memory_mb") && !alb_node_integer(&memory_mb, root, "memory_mb", 1, 1L << 24, error)) ||
+        (alb_node_has(root, "rays_per_patch") && !alb_node_integer(&rays, root, "rays_per_patch", 1, 65536, error)) ||
         (alb_node_has(root, "seed") && !alb_node_integer(&seed, root, "seed", 0, 0x7fffffff, error)) ||
         (alb_node_has(root, "residual") && !alb_node_number(&scene->residual, root, "residual", 1e-12, 0.1, error)))
         return false;
     scene->rays_per_patch = (int)rays;
+    scene->memory_bytes = (size_t)memory_mb << 20;
     scene->seed = (uint64_t)seed;
     return true;
 }
@@ -183,7 +187,9 @@ bool alb_scene_read(alb_scene *scene, alb_provenance *provenance, const char *pa
     alb_record *record = alb_record_read(path, error);
     const bool ok =
         record && alb_provenance_add(provenance, path, error) && alb_record_root(&root, record, error) &&
-        alb_node_allow(root, "format objects materials lights camera rays_per_patch residual seed", error) &&
+        alb_node_allow(root,
+                       "format objects materials lights camera rays_per_patch error_percent memory_mb residual seed",
+                       error) &&
         read_settings(scene, root, error) && alb_scene_read_surfaces(&in, root) && alb_scene_read_objects(&in, root) &&
         read_lights(&in, root) && read_camera(&in, root);
     alb_record_free(record);

@@ -26,10 +26,17 @@ static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *er
     memset(s->irradiance, 0, n * sizeof *s->irradiance);
     for (size_t p = 0; p < n; p++)
         memcpy(s->exitance[p], scene->surfaces[scene->mesh.groups[p]].exitance, sizeof s->exitance[p]);
-    for (size_t i = 0; i < scene->light_count; i++)
-        if (!alb_light_add(s->irradiance, &scene->lights[i], &s->patches, &s->tracer, &s->factors, scene->seed,
-                           UINT64_MAX - i, error))
-            return false;
+    alb_progress progress;
+    bool ok = true;
+    alb_progress_begin(&progress, "lights", (long)scene->light_count);
+    for (size_t i = 0; ok && i < scene->light_count; i++) {
+        ok = alb_light_add(s->irradiance, &scene->lights[i], &s->patches, &s->tracer, &s->factors, scene->seed,
+                           UINT64_MAX - i, error);
+        alb_progress_at(&progress, (long)i + 1);
+    }
+    alb_progress_end(&progress);
+    if (!ok)
+        return false;
     s->lamps_direct = alb_lamps_are_small(&s->patches, (const double(*)[3])s->exitance);
     return !s->lamps_direct || alb_lamps_add(s->irradiance, (const double(*)[3])s->exitance, &s->patches, &s->tracer,
                                              scene->seed, UINT64_MAX - ALB_LIGHTS_MAX, error);
@@ -128,18 +135,58 @@ static void add_lamps(alb_solution *s, double sign)
             s->radiosity[p][c] += sign * s->exitance[p][c];
 }
 
+// Radiosity of an even sky as bright as the scene's: pi times its mean radiance.
+static void sky_radiosity(double sky[3], const alb_scene *scene)
+{
+    enum { DIRECTIONS = 256 };
+    sky[0] = sky[1] = sky[2] = 0;
+    for (size_t i = 0; i < scene->light_count; i++)
+        for (int k = 0; k < DIRECTIONS && scene->lights[i].kind == ALB_LIGHT_ENVIRONMENT; k++) {
+            double radiance[3];
+            const double y = 1 - (2 * k + 1.0) / DIRECTIONS, side = sqrt(1 - y * y), angle = 2.399963229728653 * k;
+            alb_light_sky(radiance, &scene->lights[i], (alb_vector){side * cos(angle), y, side * sin(angle)});
+            for (int c = 0; c < 3; c++)
+                sky[c] += M_PI * radiance[c] / DIRECTIONS;
+        }
+}
+
 // Accounts of a solution: what it may lack, and where the light goes.
 static bool take_stock(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
+    double sky[3];
+    sky_radiosity(sky, scene);
     s->bound = alb_radiosity_bound(&s->equations, &s->report, (const double(*)[3])s->radiosity);
-    return alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, NULL, error) &&
+    return alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, sky, error) &&
            take_irradiance(s, scene, error);
+}
+
+// Casts more rays where the first solution asks for them, and solves again from it. The time counts as that of the
+// rays.
+static bool refine_rays(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    double sky[3];
+    const double start_s = alb_clock_s();
+    const size_t rays = s->factors.rows.first[s->patches.count];
+    sky_radiosity(sky, scene);
+    const bool ok =
+        alb_form_factors_refine(NULL, &s->factors, &s->patches, &s->tracer, (const double(*)[3])s->radiosity, sky,
+                                scene->error_percent, ALB_RAYS_REFINED_MAX, error);
+    s->bytes[ALB_STAGE_FORM_FACTORS] = ok ? alb_form_factors_bytes(&s->factors) : 0;
+    s->seconds[ALB_STAGE_FORM_FACTORS] += alb_clock_s() - start_s;
+    s->seconds[ALB_STAGE_SOLVE] -= alb_clock_s() - start_s;
+    if (!ok || s->factors.rows.first[s->patches.count] == rays)
+        return ok;
+    alb_radiosity_free(&s->equations);
+    return (!s->factors.sky_rays || light_patches(s, scene, error)) &&
+           alb_radiosity_create(&s->equations, &s->patches, &s->scatter, &s->factors, error) &&
+           solve(s, scene, true, error);
 }
 
 static bool first_solve(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
     if (!alb_radiosity_create(&s->equations, &s->patches, &s->scatter, &s->factors, error) ||
-        !solve(s, scene, false, error) || !take_stock(s, scene, error))
+        !solve(s, scene, false, error) || (scene->error_percent > 0 && !refine_rays(s, scene, error)) ||
+        !take_stock(s, scene, error))
         return false;
     s->bytes[ALB_STAGE_SOLVE] = alb_radiosity_bytes(&s->equations) + 24 * s->patches.count * sizeof *s->radiosity;
     add_lamps(s, 1);
@@ -199,8 +246,8 @@ static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, 
         s->bytes[stage] = (size_t)s->tracer.bytes;
         return true;
     case ALB_STAGE_FORM_FACTORS:
-        if (!alb_form_factors_create(&s->factors, &s->patches, &s->tracer, scene->rays_per_patch, scene->seed,
-                                     ALB_SAMPLING_LATTICE, error))
+        if (!alb_form_factors_create_within(&s->factors, &s->patches, &s->tracer, scene->rays_per_patch, scene->seed,
+                                            ALB_SAMPLING_LATTICE, scene->memory_bytes, error))
             return false;
         s->bytes[stage] = alb_form_factors_bytes(&s->factors);
         return true;
@@ -222,7 +269,7 @@ bool alb_solution_create(alb_solution *solution, const alb_scene *scene, alb_err
     for (int stage = 0; ok && stage < ALB_STAGES; stage++) {
         const double start_s = alb_clock_s();
         ok = run_stage(solution, (alb_stage)stage, scene, error);
-        solution->seconds[stage] = alb_clock_s() - start_s;
+        solution->seconds[stage] += alb_clock_s() - start_s; // refining rays hands time back
         alb_progress_at(&progress, stage + 1);
     }
     alb_progress_end(&progress);

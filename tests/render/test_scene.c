@@ -29,12 +29,15 @@ static void reads_a_scene(void **state)
     check_ok(read_text(&scene,
                        "{\"format\":1," BOX "," WHITE ",\"lights\":[{\"kind\":\"environment\",\"radiance\":[1,2,3]},"
                        "{\"kind\":\"spot\",\"position_mm\":[0,0,9],\"direction\":[0,0,-2],\"half_angle_deg\":5,"
-                       "\"flux\":[1,1,1]}]," CAMERA ",\"rays_per_patch\":32,\"residual\":1e-3,\"seed\":9}",
+                       "\"flux\":[1,1,1]}]," CAMERA
+                       ",\"rays_per_patch\":32,\"error_percent\":2,\"memory_mb\":3,\"residual\":1e-3,\"seed\":9}",
                        &error),
              &error);
     assert_int_equal(scene.mesh.face_count, 4 * 40 * 40 + 8 * 40 * 4);
     assert_int_equal(scene.light_count, 2);
     assert_int_equal(scene.rays_per_patch, 32);
+    check_near(scene.error_percent, 2, 0);
+    assert_int_equal(scene.memory_bytes, 3 << 20);
     check_near(scene.lights[1].direction.z, -1, 1e-15);
     alb_scene_free(&scene);
 }
@@ -49,6 +52,8 @@ static void refuses_what_is_wrong(void **state)
         {"{\"format\":1," BOX "," WHITE "}", "camera"},
         {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"rays\":3}", "rays"},
         {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"rays_per_patch\":0}", "rays_per_patch"},
+        {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"error_percent\":0}", "error_percent"},
+        {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"memory_mb\":0}", "memory_mb"},
         {"{\"format\":1," BOX ",\"materials\":{\"m\":{\"reflectance\":[0.5,0.5,1.5]}}," CAMERA "}", "reflectance"},
         {"{\"format\":1," BOX ",\"materials\":{\"x\":{\"reflectance\":[0,0,0]}}," CAMERA "}", "no material 'm'"},
         {"{\"format\":1," BOX ",\"materials\":{\"m\":{\"dipole\":{\"absorption_per_mm\":[1,1,1]}}}," CAMERA "}",

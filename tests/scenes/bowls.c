@@ -36,7 +36,7 @@ static int bowl_outline(double outline[][2], double radius, double wall)
 bool scene_bowls(alb_scene *scene, double detail, int frame, alb_error *error)
 {
     (void)frame;
-    const double totals[4][3] = {{0.3, 0.46, 0.34}, {0.48, 0.46, 0.42}, {0.48, 0.33, 0.33}, {0.52, 0.46, 0.38}};
+    const double totals[4][3] = {{0.3, 0.46, 0.34}, {0.48, 0.46, 0.42}, {0.48, 0.33, 0.33}, {0.45, 0.4, 0.34}};
     const double decays[4][3] = {{0.4, 0.25, 0.35}, {0.15, 0.17, 0.2}, {0.2, 0.35, 0.35}, {0.25, 0.3, 0.4}};
     const alb_surface surfaces[SURFACES] = {
         surface_opaque("table", 0.35, 0.25, 0.18), surface_translucent("green glass", totals[0], decays[0]),

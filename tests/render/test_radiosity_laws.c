@@ -1,0 +1,243 @@
+// Laws of the balance of light, on whole scenes: linearity, limits, closed forms, and how few products it takes.
+#include "base/random.h"
+#include "check.h"
+#include "render/shape.h"
+#include "render/solution.h"
+
+static void add_mesh(alb_scene *scene, alb_mesh *part, uint16_t group)
+{
+    alb_error error = {0};
+    const size_t first = scene->mesh.face_count;
+    if (first)
+        check_ok(alb_mesh_append(&scene->mesh, part, 1, (alb_vector){0}, &error), &error);
+    else {
+        scene->mesh = *part;
+        *part = (alb_mesh){0};
+    }
+    for (size_t i = first; i < scene->mesh.face_count; i++)
+        scene->mesh.groups[i] = group;
+    alb_mesh_free(part);
+}
+
+static void begin(alb_scene *scene, int rays, double residual)
+{
+    *scene = (alb_scene){.rays_per_patch = rays, .residual = residual, .seed = 5, .surface_count = 2};
+    scene->surfaces = calloc(2, sizeof *scene->surfaces);
+    scene->lights = calloc(2, sizeof *scene->lights);
+}
+
+static alb_surface diffuse(double r, double g, double b)
+{
+    return (alb_surface){.name = "diffuse", .reflectance = {r, g, b}};
+}
+
+// Profile exp(-rate r), all that leaves the plane: albedo.
+static alb_surface wax(double albedo, double rate_per_mm)
+{
+    alb_surface out = {.name = "wax", .scatters = true};
+    for (int c = 0; c < 3; c++)
+        out.profiles[0][c] =
+            (alb_profile){ALB_FORM_EXPONENTIAL, {albedo * rate_per_mm * rate_per_mm / (2 * M_PI), rate_per_mm}};
+    return out;
+}
+
+// A room of 60 mm with a ball in it; surface 0 the walls, 1 the ball.
+static void room_with_ball(alb_scene *scene, int cells)
+{
+    alb_error error = {0};
+    alb_mesh walls = {0}, ball = {0};
+    const alb_box box = {.size_mm = {60, 60, 60}, .cells = {cells, cells, cells}, .grading = 1, .inward = true};
+    const alb_sphere sphere = {.radius_mm = 12, .centre_mm = {5, -4, -10}, .subdivisions = 2};
+    check_ok(alb_shape_box(&walls, &box, &error), &error);
+    check_ok(alb_shape_sphere(&ball, &sphere, &error), &error);
+    add_mesh(scene, &walls, 0);
+    add_mesh(scene, &ball, 1);
+    scene->lights[0] = (alb_light){.kind = ALB_LIGHT_SPOT,
+                                   .position_mm = {0, 0, 29},
+                                   .direction = {0, 0, -1},
+                                   .half_angle_deg = 30,
+                                   .flux = {1, 2, 1}};
+    scene->lights[1] = (alb_light){.kind = ALB_LIGHT_POINT, .position_mm = {20, 20, 20}, .flux = {1, 2, 3}};
+}
+
+// B of both lights is the sum of their own, and of a light seven times as bright seven times.
+static void lights_superpose(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_scene scene;
+    alb_solution s[3];
+    begin(&scene, 64, 1e-6);
+    room_with_ball(&scene, 6);
+    scene.surfaces[0] = diffuse(0.5, 0.6, 0.8), scene.surfaces[1] = wax(0.8, 0.3);
+    const alb_light lights[2] = {scene.lights[0], scene.lights[1]};
+    scene.light_count = 2; // each keeps its place, and with it its random numbers
+    for (int k = 0; k < 3; k++) {
+        for (int c = 0; c < 3; c++) {
+            scene.lights[0].flux[c] = k == 0 ? lights[0].flux[c] : k == 1 ? 0 : 7 * lights[0].flux[c];
+            scene.lights[1].flux[c] = k == 0 ? 0 : lights[1].flux[c];
+        }
+        check_ok(alb_solution_create(&s[k], &scene, &error), &error);
+    }
+    for (size_t p = 0; p < s[0].patches.count; p++)
+        for (int c = 0; c < 3; c++) // the residual, 1e-6 of |b|, where it is dark
+            check_relative(s[2].radiosity[p][c], 7 * s[0].radiosity[p][c] + s[1].radiosity[p][c], 1e-4);
+    for (int k = 0; k < 3; k++)
+        alb_solution_free(&s[k]);
+    alb_scene_free(&scene);
+}
+
+// Without translucency it is plain radiosity: B = E rho + rho F B, solved here row by row in double precision.
+static void opaque_scenes_are_plain_radiosity(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_scene scene;
+    alb_solution s;
+    begin(&scene, 64, 1e-6);
+    room_with_ball(&scene, 6);
+    scene.light_count = 2;
+    scene.surfaces[0] = diffuse(0.5, 0.6, 0.8), scene.surfaces[1] = diffuse(0.9, 0.1, 0.95);
+    check_ok(alb_solution_create(&s, &scene, &error), &error);
+    const size_t n = s.patches.count;
+    alb_rgb *b = calloc(n, sizeof *b);
+    uint32_t row[64];
+    for (int step = 0; step < 200; step++)
+        for (size_t p = 0; p < n; p++) {
+            double sum[3] = {0};
+            alb_form_factors_row(row, &s.factors, p);
+            for (int q = 0; q < 64; q++)
+                for (int c = 0; c < 3 && row[q] < n; c++)
+                    sum[c] += b[row[q]][c];
+            for (int c = 0; c < 3; c++)
+                b[p][c] = scene.surfaces[scene.mesh.groups[p]].reflectance[c] * (s.irradiance[p][c] + sum[c] / 64);
+        }
+    for (size_t p = 0; p < n; p++)
+        for (int c = 0; c < 3; c++)
+            check_relative(s.radiosity[p][c], b[p][c], 1e-4); // the residual, 1e-6 of |b|, where it is dark
+    free(b);
+    alb_solution_free(&s);
+    alb_scene_free(&scene);
+}
+
+// As the mean free path goes to nothing, wax becomes a diffuse surface of its albedo.
+static void short_paths_become_diffuse(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_solution s;
+    alb_rgb *matt = NULL;
+    double before = INFINITY;
+    for (int k = 0; k < 4; k++) {
+        alb_scene scene;
+        begin(&scene, 64, 1e-6);
+        room_with_ball(&scene, 6);
+        scene.light_count = 1;
+        scene.surfaces[0] = diffuse(0.5, 0.5, 0.5);
+        const double rates[4] = {0, 0.5, 5, 50}; // patches of the ball have edges of 3.5 mm
+        scene.surfaces[1] = k ? wax(0.8, rates[k]) : diffuse(0.8, 0.8, 0.8);
+        check_ok(alb_solution_create(&s, &scene, &error), &error);
+        double off = 0, all = 0;
+        if (!k) {
+            matt = calloc(s.patches.count, sizeof *matt);
+            memcpy(matt, s.radiosity, s.patches.count * sizeof *matt);
+        }
+        for (size_t p = 0; p < s.patches.count; p++)
+            for (int c = 0; c < 3 && scene.mesh.groups[p]; c++) {
+                off += s.patches.areas_mm2[p] * pow(s.radiosity[p][c] - matt[p][c], 2);
+                all += s.patches.areas_mm2[p] * pow(matt[p][c], 2);
+            }
+        if (k)
+            check_below(sqrt(off / all), k == 3 ? 0.03 : 0.5 * before); // k 3: light crosses 1/50 mm of 3.5
+        before = k ? sqrt(off / all) : before;
+        alb_solution_free(&s);
+        alb_scene_free(&scene);
+    }
+    free(matt);
+}
+
+// Concentric spheres: F_12 = 1, F_21 = (r1/r2)^2, F_22 = 1 - F_21, two equations with two unknowns.
+static void two_concentric_spheres(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_scene scene;
+    alb_solution s;
+    alb_mesh inner = {0}, outer = {0};
+    const alb_sphere small = {.radius_mm = 10, .subdivisions = 3},
+                     large = {.radius_mm = 25, .subdivisions = 3, .inward = true};
+    begin(&scene, 256, 1e-6);
+    check_ok(alb_shape_sphere(&inner, &small, &error), &error);
+    check_ok(alb_shape_sphere(&outer, &large, &error), &error);
+    add_mesh(&scene, &outer, 0);
+    add_mesh(&scene, &inner, 1);
+    scene.surfaces[0] = diffuse(0.9, 0.5, 0.2), scene.surfaces[1] = diffuse(0.3, 0.7, 0.95);
+    for (int c = 0; c < 3; c++)
+        scene.surfaces[0].exitance[c] = 1 + c, scene.surfaces[1].exitance[c] = 5 - c;
+    check_ok(alb_solution_create(&s, &scene, &error), &error);
+    double area[2] = {0}, mean[2][3] = {{0}};
+    for (size_t p = 0; p < s.patches.count; p++) {
+        area[scene.mesh.groups[p]] += s.patches.areas_mm2[p];
+        for (int c = 0; c < 3; c++)
+            mean[scene.mesh.groups[p]][c] += s.patches.areas_mm2[p] * s.radiosity[p][c];
+    }
+    const double f = area[1] / area[0]; // of the facets
+    for (int c = 0; c < 3; c++) {
+        const double r0 = scene.surfaces[0].reflectance[c], r1 = scene.surfaces[1].reflectance[c];
+        const double m0 = scene.surfaces[0].exitance[c], m1 = scene.surfaces[1].exitance[c];
+        // B0 = m0 + r0 (f B1 + (1 - f) B0), B1 = m1 + r1 B0
+        const double b0 = (m0 + r0 * f * m1) / (1 - r0 * (1 - f) - r0 * f * r1), b1 = m1 + r1 * b0;
+        // sampling: 1280 rows of 256 rays share the small sphere's 1/6 of the view, 0.1 % of it in the mean
+        check_relative(mean[0][c] / area[0], b0, 2e-3);
+        check_relative(mean[1][c] / area[1], b1, 2e-3);
+    }
+    alb_solution_free(&s);
+    alb_scene_free(&scene);
+}
+
+// Two levels: at most 12 products to 1e-3 at any albedo, where bounce after bounce takes hundreds; and the stated bound
+// holds against a solution a thousand times as exact.
+static void products_are_few_at_any_albedo(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_scene scene;
+    alb_solution s, exact;
+    begin(&scene, 256, 1e-3);
+    room_with_ball(&scene, 10);
+    scene.light_count = 1;
+    const double albedos[4] = {0.5, 0.8, 0.95, 0.99};
+    for (int k = 0; k < 4; k++) {
+        const double albedo = albedos[k];
+        scene.surfaces[0] = diffuse(albedo, albedo, albedo), scene.surfaces[1] = wax(albedo, 0.3);
+        scene.residual = 1e-3;
+        check_ok(alb_solution_create(&s, &scene, &error), &error);
+        scene.residual = 1e-6;
+        check_ok(alb_solution_create(&exact, &scene, &error), &error);
+        assert_in_range(s.report.iterations, 1, 12);
+        assert_in_range(exact.report.iterations, 1, 20);
+        for (int c = 0; c < 3; c++) {
+            double off = 0, all = 0;
+            for (size_t p = 0; p < s.patches.count; p++) {
+                off += s.patches.areas_mm2[p] * fabs(s.radiosity[p][c] - exact.radiosity[p][c]);
+                all += s.patches.areas_mm2[p] * s.radiosity[p][c];
+            }
+            check_below(off / all, s.bound);
+        }
+        alb_solution_free(&s);
+        alb_solution_free(&exact);
+    }
+    alb_scene_free(&scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lights_superpose),
+        cmocka_unit_test(opaque_scenes_are_plain_radiosity),
+        cmocka_unit_test(short_paths_become_diffuse),
+        cmocka_unit_test(two_concentric_spheres),
+        cmocka_unit_test(products_are_few_at_any_albedo),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
