@@ -120,7 +120,7 @@ static void warn(const alb_scene *scene, const alb_solution *s)
                 100.0 * (double)s->factors.back_rays / (double)s->factors.rows.first[s->patches.count]);
     for (size_t b = 0; b < s->scatter.body_count; b++) {
         open += !s->scatter.bodies[b].closed;
-        bent += s->scatter.bodies[b].closed && !s->scatter.bodies[b].convex;
+        bent += s->scatter.bodies[b].closed && !s->scatter.bodies[b].convex && !s->scatter.bodies[b].detours;
     }
     if (open)
         fprintf(stderr,

@@ -7,7 +7,9 @@
 //     near                patches, whole or in equal parts, each at its own distance (scatter_links.c)
 //     far                 clusters of patches (scatter_forest.c), to second order in their extent; none is left out,
 //                         so that a profile may become wider than that for which the links were made
-// Distances are straight lines: exact inside a convex body, too short otherwise (closed, convex: the caller warns).
+// Distances are straight lines where these stay inside the body, which is exact, and the length of the shortest path
+// inside elsewhere (optical_path.h). Straight however in bodies that are not closed, and in slabs: too short across
+// their hollows (the caller warns).
 // Between the faces of a slab the transmission profile acts at the lateral distance; on one face the reflection
 // profile; from and to the edge faces the reflection profile at the straight distance, for want of a measurement there.
 // Stops being true where the profile's plane geometry does: within a diffusion length of edges, and for solids thinner
@@ -30,7 +32,9 @@ struct alb_scatter_parts {
     alb_scatter_kernel *kernels;
     size_t kernel_count;
     alb_body_kernels *of_bodies;
-    alb_rule *self; // of the leaves
+    alb_rule *self;           // of the leaves
+    alb_bodies found;         // while links are made
+    alb_optical_paths *paths; // likewise: of each body
     const uint16_t *materials;
 };
 
@@ -70,7 +74,8 @@ static bool make_kernels(alb_scatter *scatter, const alb_patches *patches, const
                 const double self = radius_of(patches, patch);
                 const double out = alb_length(alb_sub(patches->centroids[patch], tree->middle_mm));
                 selves[k] = fmax(selves[k], self);
-                reaches[k] = fmax(reaches[k], 2.02 * (out + self));
+                reaches[k] =
+                    fmax(reaches[k], (scatter->bodies[tree->body].convex ? 2.02 : 8) * (out + self)); // detours
             }
         }
     }
@@ -81,6 +86,48 @@ static bool make_kernels(alb_scatter *scatter, const alb_patches *patches, const
     free(reaches);
     free(selves);
     return ok;
+}
+
+static void free_paths(alb_scatter_parts *p)
+{
+    for (size_t b = 0; p->paths && b < p->found.count; b++)
+        alb_optical_paths_free(&p->paths[b]);
+    free(p->paths);
+    p->paths = NULL;
+    alb_bodies_free(&p->found);
+}
+
+// How far detours are measured: where a hundredth of the widest profile's light is further off.
+static double reach_of(const alb_profile profiles[3])
+{
+    double reach = 0;
+    for (int c = 0; c < 3; c++) {
+        const double total = alb_profile_total(&profiles[c]);
+        double r = 1e-6;
+        while (total > 0 && 2 * M_PI * alb_profile_disc(&profiles[c], r) < 0.99 * total && r < 1e6)
+            r *= 1.1;
+        reach = fmax(reach, r);
+    }
+    return reach;
+}
+
+// Of solids that are not convex; the others go straight.
+static bool make_paths(alb_scatter *scatter, const alb_patches *patches, const alb_surface *surfaces, alb_error *error)
+{
+    alb_scatter_parts *p = scatter->parts;
+    if (!(p->paths = alb_allocate(p->found.count, sizeof *p->paths, error)))
+        return false;
+    for (size_t b = 0; b < p->found.count; b++) {
+        const alb_scatter_kernel *kernel = &p->kernels[p->of_bodies[b].index[ALB_REFLECTION]];
+        const alb_optical_options options = {.reach_mm = reach_of(surfaces[kernel->surface].profiles[ALB_REFLECTION])};
+        const bool slab = p->kernels[p->of_bodies[b].index[ALB_TRANSMISSION]].side == ALB_TRANSMISSION;
+        if (slab || !p->found.bodies[b].closed || p->found.bodies[b].convex)
+            continue;
+        if (!alb_optical_paths_create(&p->paths[b], &p->found.bodies[b], patches, &options, error))
+            return false;
+        scatter->bodies[b].detours = p->paths[b].kind != ALB_OPTICAL_CONVEX;
+    }
+    return true;
 }
 
 static bool make_links(alb_scatter *scatter, const alb_patches *patches, const alb_surface *surfaces,
@@ -94,7 +141,10 @@ static bool make_links(alb_scatter *scatter, const alb_patches *patches, const a
         alb_scatter_kernel_needs_find(&needs[k], &p->kernels[k],
                                       surfaces[p->kernels[k].surface].profiles[p->kernels[k].side],
                                       links_for(error_wanted));
-    bool ok = alb_links_create(&p->links, &p->forest, patches, p->of_bodies, p->kernels, needs, error_wanted, error);
+    bool ok = make_paths(scatter, patches, surfaces, error) &&
+              alb_links_create(&p->links, &p->forest, patches, p->of_bodies, p->kernels, needs, p->paths, error_wanted,
+                               error);
+    free_paths(p);
     free(needs);
     for (size_t k = 0; k < p->kernel_count; k++)
         p->kernels[k].first_used = p->kernels[k].octave_count - 1;
@@ -133,18 +183,17 @@ static bool find_bodies(alb_scatter *scatter, const alb_patches *patches, const 
 {
     const size_t n = patches->count;
     const uint16_t *materials = scatter->parts->materials;
-    alb_bodies found = {0};
+    alb_bodies *found = &scatter->parts->found;
     int *labels = alb_allocate(n, sizeof *labels, error);
     for (size_t i = 0; labels && i < n; i++)
         labels[i] = surfaces[materials[i]].scatters ? materials[i] : -1;
-    const bool ok = labels && alb_bodies_find(&found, patches, labels, error) &&
-                    (scatter->bodies = alb_allocate(found.count, sizeof *scatter->bodies, error)) &&
-                    alb_forest_create(&scatter->parts->forest, &found, patches, materials, surfaces, error);
-    for (size_t b = 0; ok && b < found.count; b++)
-        scatter->bodies[scatter->body_count++] =
-            (alb_scatter_body){found.bodies[b].count, found.bodies[b].closed, found.bodies[b].convex};
+    const bool ok = labels && alb_bodies_find(found, patches, labels, error) &&
+                    (scatter->bodies = alb_allocate(found->count, sizeof *scatter->bodies, error)) &&
+                    alb_forest_create(&scatter->parts->forest, found, patches, materials, surfaces, error);
+    for (size_t b = 0; ok && b < found->count; b++)
+        scatter->bodies[scatter->body_count++] = (alb_scatter_body){found->bodies[b].count, found->bodies[b].closed,
+                                                                    found->bodies[b].convex, .detours = false};
     free(labels);
-    alb_bodies_free(&found);
     return ok;
 }
 
@@ -181,6 +230,7 @@ void alb_scatter_free(alb_scatter *scatter)
         free(p->kernels);
         free(p->of_bodies);
         free(p->self);
+        free_paths(p);
         alb_links_free(&p->links);
         alb_forest_free(&p->forest);
         free(p);

@@ -18,6 +18,7 @@ typedef struct alb_surface {
 typedef struct alb_scatter_body {
     size_t patch_count;
     bool closed, convex;
+    bool detours; // not convex, and distances are paths inside
 } alb_scatter_body;
 
 typedef struct alb_scatter_parts alb_scatter_parts;

@@ -28,8 +28,22 @@ typedef struct link {
     size_t codes;
 } link;
 
+// A link before its distances are known; left_out: bits of the rows that are the source itself or take it exactly.
+typedef struct wish {
+    uint32_t node;
+    uint8_t side, left_out;
+    int8_t level;
+} wish;
+
 // What one thread works with.
 typedef struct workspace {
+    wish *wishes;
+    float (*detours)[ALB_BLOCK]; // of each wish: how much longer the paths of the rows are than straight
+    alb_optical_target *targets; // of the wishes
+    float *distances;
+    size_t wish_count, wish_capacity, detour_capacity, target_capacity, distance_capacity;
+    alb_optical_workspace paths;
+    const alb_optical_paths *paths_of; // whom it serves
     link *links;
     uint32_t *order;
     uint8_t *codes;
@@ -45,6 +59,7 @@ typedef struct viewer {
     const alb_scatter_kernel_needs *needs[ALB_SIDES];
     const uint16_t *index; // of the kernels
     const alb_tree *tree;
+    const alb_optical_paths *paths;
     double error_wanted;
     uint32_t first_leaf, row_count;
     float at[3][ALB_BLOCK]; // centroids, rows that are missing stand where the last one does
@@ -178,10 +193,18 @@ static void aim(int8_t direction[4], const viewer *v, const alb_cluster *cluster
     direction[3] = (int8_t)fminf(rintf(64 * along / (squared * cluster->spread_mm2)), INT8_MAX);
 }
 
-// left_out: bits of the rows that are the source itself or take it exactly.
-static void add_link(const viewer *v, uint32_t node, int side, int level, unsigned left_out)
+static void want(const viewer *v, uint32_t node, int side, int level, unsigned left_out)
 {
-    const alb_cluster *cluster = &v->forest->clusters[node];
+    workspace *work = v->work;
+    work->wishes = grow(&work->failed, work->wishes, &work->wish_capacity, work->wish_count, 1, sizeof *work->wishes);
+    if (!work->failed)
+        work->wishes[work->wish_count++] = (wish){node, (uint8_t)side, (uint8_t)left_out, (int8_t)level};
+}
+
+static void add_link(const viewer *v, const wish *wished, int level, const float detours[ALB_BLOCK])
+{
+    const int side = wished->side;
+    const alb_cluster *cluster = &v->forest->clusters[wished->node];
     const alb_scatter_kernel *kernel = v->kernels[side];
     workspace *work = v->work;
     source parts[PARTS_MAX];
@@ -201,16 +224,16 @@ static void add_link(const viewer *v, uint32_t node, int side, int level, unsign
     for (int part = 0; part < count; part++) {
         measure(distances[part], v, &parts[part], side == ALB_TRANSMISSION);
         for (uint32_t row = 0; row < ALB_BLOCK; row++)
-            if (row >= v->row_count || left_out >> row & 1)
+            if (row >= v->row_count || wished->left_out >> row & 1 || !isfinite(detours[row]))
                 distances[part][row] = INFINITY;
             else
-                furthest = fmaxf(furthest, distances[part][row]);
+                furthest = fmaxf(furthest, distances[part][row] += detours[row]);
     }
     int octave = ilogbf(fmaxf(furthest, 1e-30F)) + 1 - kernel->first_octave;
     octave = octave < 0 ? 0 : octave < kernel->octave_count ? octave : kernel->octave_count - 1;
     const float per_mm = ldexpf(ALB_CODES - 2, -(kernel->first_octave + octave));
     link *added = &work->links[work->count++];
-    *added = (link){node, (uint16_t)((side * OCTAVES + octave) * ALB_LEVELS + level), {0}, work->code_count};
+    *added = (link){wished->node, (uint16_t)((side * OCTAVES + octave) * ALB_LEVELS + level), {0}, work->code_count};
     aim(added->direction, v, cluster, side);
     if (level) // of parts all round
         added->direction[3] = 64;
@@ -339,14 +362,14 @@ static void add_leaf(const viewer *v, uint32_t node, uint32_t leaf, int side)
             continue;
         const int wanted = level_of(v, cluster, side, row, distances[row]);
         if (wanted == EXACT) {
-            add_pair(v, node, side, row);
+            want(v, node, side, EXACT, ~(1U << row));
             left_out |= 1U << row;
         } else if (alb_levels[wanted].parts >= alb_levels[level].parts) {
             level = wanted;
         }
     }
     if (left_out != (1U << v->row_count) - 1)
-        add_link(v, node, side, level, left_out);
+        want(v, node, side, level, left_out);
 }
 
 static void visit(const viewer *v, uint32_t node, uint32_t leaf, uint32_t count, int side)
@@ -365,7 +388,7 @@ static void visit(const viewer *v, uint32_t node, uint32_t leaf, uint32_t count,
     const int bin = alb_scatter_kernel_bin(v->needs[side], fmaxf(room - 0.5F * cluster->radius_mm, 0));
     if ((side == ALB_TRANSMISSION || cluster->radius_mm <= 0.5F * room) &&
         12 * cluster->spread_mm2 <= v->needs[side]->size2_mm2[bin]) {
-        add_link(v, node, side, 0, 0);
+        want(v, node, side, 0, 0);
         return;
     }
     const uint32_t left = alb_left_count(count);
@@ -508,15 +531,91 @@ static void write_block(alb_link_block *block, const viewer *v, const uint16_t k
         block->link_count += *code != ALB_NO_LINK;
 }
 
+static uint32_t middle_row(const viewer *v)
+{
+    uint32_t middle = 0;
+    float nearest = INFINITY;
+    for (uint32_t row = 0; row < v->row_count; row++) {
+        const float x = v->at[0][row] - v->centre[0], y = v->at[1][row] - v->centre[1],
+                    z = v->at[2][row] - v->centre[2];
+        if (x * x + y * y + z * z < nearest)
+            nearest = x * x + y * y + z * z, middle = row;
+    }
+    return middle;
+}
+
+// How much longer the paths inside the body are than the segments from the block to the clusters: of its middle row,
+// for all. Beyond the reach a path is taken as long as that: of light so far away it matters only that it is not lost.
+static void measure_detours(const viewer *v)
+{
+    workspace *work = v->work;
+    const size_t n = work->wish_count;
+    work->targets = grow(&work->failed, work->targets, &work->target_capacity, 0, n, sizeof *work->targets);
+    work->distances = grow(&work->failed, work->distances, &work->distance_capacity, 0, n, sizeof *work->distances);
+    if (work->paths_of != v->paths && !work->failed) {
+        alb_optical_workspace_free(&work->paths);
+        work->failed = !alb_optical_workspace_create(&work->paths, v->paths, NULL);
+        work->paths_of = v->paths;
+    }
+    if (work->failed)
+        return;
+    for (size_t k = 0; k < n; k++) {
+        const alb_cluster *cluster = &v->forest->clusters[work->wishes[k].node];
+        const alb_vector middle = v->tree->middle_mm;
+        work->targets[k] = (alb_optical_target){
+            v->forest->patches[cluster->leaf], (float)(middle.x + (double)cluster->centre_mm[0]),
+            (float)(middle.y + (double)cluster->centre_mm[1]), (float)(middle.z + (double)cluster->centre_mm[2])};
+    }
+    const uint32_t patch = v->forest->patches[v->first_leaf + middle_row(v)];
+    const alb_vector from = v->patches->centroids[patch];
+    alb_optical_paths_measure(work->distances, NULL, &work->paths, v->paths, patch, work->targets, n);
+    for (size_t k = 0; k < n; k++) {
+        const alb_optical_target *to = &work->targets[k];
+        const alb_vector at = {(double)to->x_mm, (double)to->y_mm, (double)to->z_mm};
+        const float straight = (float)alb_length(alb_sub(at, from)),
+                    detour = fminf(work->distances[k], fmaxf((float)v->paths->reach_mm, straight)) - straight;
+        for (int row = 0; row < ALB_BLOCK; row++)
+            work->detours[k][row] = detour > 1e-4F * straight ? detour : 0;
+    }
+}
+
+// Links and exact pairs from the wishes; what goes a detour is not exact.
+static void grant(const viewer *v)
+{
+    workspace *work = v->work;
+    const size_t n = work->wish_count;
+    work->detours = grow(&work->failed, work->detours, &work->detour_capacity, 0, n, sizeof *work->detours);
+    if (work->failed)
+        return;
+    memset(work->detours, 0, n * sizeof *work->detours);
+    if (v->paths->kind != ALB_OPTICAL_CONVEX)
+        measure_detours(v);
+    for (size_t k = 0; !work->failed && k < n; k++) {
+        const wish *wished = &work->wishes[k];
+        uint32_t row = 0;
+        if (wished->level != EXACT) {
+            add_link(v, wished, wished->level, work->detours[k]);
+            continue;
+        }
+        while (wished->left_out >> row & 1)
+            row++;
+        if (work->detours[k][row] > 0)
+            add_link(v, wished, 3, work->detours[k]);
+        else
+            add_pair(v, wished->node, wished->side, row);
+    }
+}
+
 static void link_block(alb_link_block *block, viewer *v, const uint16_t kernels[ALB_SIDES])
 {
-    v->work->count = v->work->code_count = v->work->pair_count = 0;
+    v->work->wish_count = v->work->count = v->work->code_count = v->work->pair_count = 0;
     place_rows(v);
     for (size_t t = 0; t < v->forest->tree_count; t++) {
         const alb_tree *tree = &v->forest->trees[t];
         if (tree->body == v->tree->body)
             visit(v, tree->first_node, tree->first_leaf, tree->leaf_count, side_between(tree, v->tree));
     }
+    grant(v);
     write_block(block, v, kernels);
 }
 
@@ -543,7 +642,8 @@ static bool lay_blocks(alb_links *links, uint32_t **trees, const alb_forest *for
 
 bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patches *patches,
                       const alb_body_kernels *of_bodies, const alb_scatter_kernel *kernels,
-                      const alb_scatter_kernel_needs *needs, double error_wanted, alb_error *error)
+                      const alb_scatter_kernel_needs *needs, const alb_optical_paths *paths, double error_wanted,
+                      alb_error *error)
 {
     bool failed = false;
     uint32_t *trees = NULL;
@@ -566,6 +666,7 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
                         .index = own,
                         .needs = {&needs[own[0]], &needs[own[1]]},
                         .tree = tree,
+                        .paths = &paths[tree->body],
                         .error_wanted = error_wanted,
                         .first_leaf = block->first_leaf,
                         .row_count = block->row_count,
@@ -573,6 +674,11 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
             link_block(block, &v, own);
         }
         failed = failed || work.failed;
+        free(work.wishes);
+        free(work.detours);
+        free(work.targets);
+        free(work.distances);
+        alb_optical_workspace_free(&work.paths);
         free(work.links);
         free(work.order);
         free(work.codes);

@@ -1,5 +1,6 @@
 // Links: from which clusters, patches and parts of patches each exit patch is lit, and how far they are.
 #pragma once
+#include "render/optical_path.h"
 #include "render/scatter_forest.h"
 #include "render/scatter_kernel.h"
 #include "render/scatter_rule.h"
@@ -52,8 +53,10 @@ typedef struct alb_body_kernels {
     uint16_t index[ALB_SIDES];
 } alb_body_kernels;
 
-// needs: of each kernel. error: of a row's sum, for the parts of near patches.
+// needs: of each kernel; paths: of each body, all zero where segments stay inside; error_wanted: of a row's sum, for
+// the parts of near patches.
 bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patches *patches,
                       const alb_body_kernels *of_bodies, const alb_scatter_kernel *kernels,
-                      const alb_scatter_kernel_needs *needs, double error_wanted, alb_error *error);
+                      const alb_scatter_kernel_needs *needs, const alb_optical_paths *paths, double error_wanted,
+                      alb_error *error);
 void alb_links_free(alb_links *links);
