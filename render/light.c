@@ -3,8 +3,9 @@
 //     spot         Phi / N for each of N rays, even in solid angle inside the cone, that meets the patch's front, over
 //     A projector    the same with parallel rays, even over the disc or its pixels, displaced by the Gaussian blur
 //     environment  (pi / R) sum of L(d_q) over the sky rays q of the patch's form factors
-// Stops being true: a point light nearer to a patch than a tenth of its size is held at that distance; a map with a
-// small sun is seen by few of the R rays. A ray that meets the back of a patch is absorbed there.
+// Stops being true: a shadow that touches none of a patch's outermost points is not there; a point light nearer to a
+// patch than a tenth of its size is held at that distance; a map with a small sun is seen by few of the R rays. A ray
+// that meets the back of a patch is absorbed there.
 #include "render/light.h"
 #include "base/memory.h"
 #include "base/random.h"
@@ -64,22 +65,38 @@ static void add_environment(double (*irradiance)[3], const alb_light *light, con
     }
 }
 
-// Mean of cos / (4 pi d^2) over the patch, zero where the light is hidden.
+// Mean of cos / (4 pi d^2) over the patch, zero where the light is hidden. The four outermost points look first: where
+// they agree, the others see what they see.
 static double point_share(const alb_light *light, const alb_patches *patches, const alb_tracer *tracer, size_t patch,
                           uint64_t seed, uint64_t stream)
 {
-    double sum = 0;
+    enum { ALL = POINTS * POINTS };
+    static const int outermost[4] = {0, POINTS - 1, ALL - POINTS, ALL - 1};
+    alb_vector points[ALL];
+    double sums[2] = {0}, shares[ALL], sum = 0; // hidden, seen
     alb_random random = alb_random_at(seed, stream, patch);
     const double nearest2 = 0.01 * patches->areas_mm2[patch];
-    for (int k = 0; k < POINTS * POINTS && !alb_patch_buried(patches, patch); k++) {
+    if (alb_patch_buried(patches, patch))
+        return 0;
+    for (int k = 0; k < ALL; k++) {
         const double u = (k % POINTS + alb_random_uniform(&random)) / POINTS;
         const double v = ((double)(k / POINTS) + alb_random_uniform(&random)) / POINTS;
-        const alb_vector point = alb_patch_point(patches, patch, u, v), to = alb_sub(light->position_mm, point);
-        const double distance2 = alb_dot(to, to), cosine = alb_dot(alb_unit(to), patches->normals[patch]);
-        if (cosine > 0 && !alb_tracer_blocked(tracer, point, light->position_mm))
-            sum += cosine / (4 * M_PI * fmax(distance2, nearest2));
+        points[k] = alb_patch_point(patches, patch, u, v);
+        const alb_vector to = alb_sub(light->position_mm, points[k]);
+        const double cosine = alb_dot(alb_unit(to), patches->normals[patch]);
+        shares[k] = fmax(0, cosine) / (4 * M_PI * fmax(alb_dot(to, to), nearest2));
+        sum += shares[k];
     }
-    return sum / (POINTS * POINTS);
+    for (int i = 0; i < 4; i++)
+        if (shares[outermost[i]] > 0)
+            sums[!alb_tracer_blocked(tracer, points[outermost[i]], light->position_mm)] += 1;
+    if (sums[0] == 0 || sums[1] == 0)
+        return sums[0] > 0 ? 0 : sum / ALL;
+    sum = 0;
+    for (int k = 0; k < ALL; k++)
+        if (shares[k] > 0 && !alb_tracer_blocked(tracer, points[k], light->position_mm))
+            sum += shares[k];
+    return sum / ALL;
 }
 
 static void add_point(double (*irradiance)[3], const alb_light *light, const alb_patches *patches,

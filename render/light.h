@@ -30,9 +30,10 @@ typedef struct alb_light {
 void alb_light_free(alb_light *light);
 // Radiance of the environment from the direction (unit); zero for other kinds.
 void alb_light_sky(double radiance[3], const alb_light *light, alb_vector direction);
-// Adds the light's irradiance to each patch (patch_count rows). Point: 16 shadow-tested points a patch. Spot and
-// projector: about a million stratified rays that carry flux/N each to the patch they meet, so that flux is conserved
-// exactly. Environment: the sky rays of the form factors. `seed` and `stream` pick the random numbers.
+// Adds the light's irradiance to each patch (patch_count rows). Point: 16 points a patch, shadow-tested where the
+// outermost four do not agree. Spot and projector: about a million stratified rays that carry flux/N each to the patch
+// they meet, so that flux is conserved exactly. Environment: the sky rays of the form factors. `seed` and `stream` pick
+// the random numbers.
 bool alb_light_add(double (*irradiance)[3], const alb_light *light, const alb_patches *patches,
                    const alb_tracer *tracer, const alb_form_factors *factors, uint64_t seed, uint64_t stream,
                    alb_error *error);
