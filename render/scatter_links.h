@@ -3,16 +3,8 @@
 #include "render/optical_path.h"
 #include "render/scatter_forest.h"
 #include "render/scatter_kernel.h"
+#include "render/scatter_parts.h"
 #include "render/scatter_rule.h"
-
-// A source is taken whole or in equal parts; `spread`: variance of a part over that of the
-// whole; of long patches, which are cut across, smaller.
-enum { ALB_LEVELS = 6 };
-typedef struct alb_level {
-    int parts;
-    float spread;
-} alb_level;
-extern const alb_level alb_levels[ALB_LEVELS];
 
 // Links of one block of exit patches by one octave of one kernel and one level. Node k of the run is
 // first + deltas[0] + ... + deltas[k]; each has ALB_BLOCK codes a part, one a row.
