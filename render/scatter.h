@@ -14,63 +14,37 @@ typedef struct alb_surface {
     alb_profile profiles[ALB_SIDES][3]; // RGB; transmission for slabs only
 } alb_surface;
 
-// The three profiles of one side, tabulated over distance; where a table is NULL the closed form is used.
-enum { ALB_SCATTER_TABLE = 16384 };
-typedef struct alb_radial {
-    const alb_profile *profiles; // R, G, B
-    double entries_per_mm;
-    float (*values)[4];    // S(r) of R, G, B and a zero; ALB_SCATTER_TABLE + 2 entries
-    double (*discs)[3][2]; // P(r) / r^2 and its derivative times the spacing, P(r) = integral_0^r S r dr; as many
-} alb_radial;
-
-// Patches as sources, side by side: three runs, the faces +1, the edge 0 (all of a solid), the faces -1.
-typedef struct alb_sources {
-    size_t count, starts[4];
-    float *x_mm, *y_mm, *z_mm;   // relative to the body's middle
-    float *near2_mm2[ALB_SIDES]; // squared distance below which the patch, as a source, is integrated exactly
-    double (*amounts)[4];        // R, G, B and a zero: area, or area times irradiance
-} alb_sources;
-
-// One scattering body with what its far pairs need.
+// One scattering body.
 typedef struct alb_scatter_body {
-    uint32_t *patches;             // in the order of the runs
-    alb_sources sources, lit;      // all; workspace of a product (one at a time): those that light falls on
-    float axis[3];                 // slab: normal of the faces
-    alb_radial radials[ALB_SIDES]; // transmission for slabs only; values alone
+    size_t patch_count;
     bool closed, convex;
 } alb_scatter_body;
 
+typedef struct alb_scatter_parts alb_scatter_parts;
+
 typedef struct alb_scatter {
     size_t patch_count;
-    double (*local)[3];  // S'_jj: reflectance, or the exact self-term
-    size_t *row_starts;  // patch_count + 1: near pairs of exit patch j
-    uint32_t *sources;   // source patch i
-    float (*weights)[3]; // S'_ji
+    double (*local)[3]; // S'_jj: reflectance, or the exact self-term
     // Sum over sources i of S'_ji, what patch j sends out of even light; and the share of the flux into patch i that
     // leaves again anywhere, sum_j A_j S'_ji / A_i: the energy balance's own row.
     double (*row_sums)[3], (*column_sums)[3];
     alb_scatter_body *bodies;
     size_t body_count;
+    size_t link_count;        // an exit patch and a cluster, a patch or a part of a patch that lights it
+    alb_scatter_parts *parts; // holds the workspace of a product: one at a time
 } alb_scatter;
 
-// materials[patch] indexes surfaces. Both are read, not kept.
+// materials[patch] indexes surfaces. The surfaces are read, not kept; materials is borrowed for the life of the
+// scatter. error is the relative error wanted of S' irradiance where that is smooth: 0.005 unless there is a reason.
 bool alb_scatter_create(alb_scatter *scatter, const alb_patches *patches, const uint16_t *materials,
-                        const alb_surface *surfaces, alb_error *error);
+                        const alb_surface *surfaces, double error_wanted, alb_error *error);
 void alb_scatter_free(alb_scatter *scatter);
+// The same bodies with other profiles or reflectances: tables, self-terms and sums anew, the links stay. Their error
+// holds for profiles as wide as those of the creation or wider; with narrower ones it grows as the ratio squared.
+// ALB_BAD_DATA where a surface scatters that was opaque or the other way round, or became a slab: create anew.
+bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_error *error);
 // out = S' irradiance, RGB; out and irradiance have patch_count rows and are not the same.
 void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
-// The part of S' irradiance that crossed a slab: zero elsewhere. Same rows. Fails for want of memory alone.
-bool alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3],
-                              alb_error *error);
+// The part of S' irradiance that crossed a slab or a sheet: zero elsewhere. Same rows.
+void alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
 size_t alb_scatter_bytes(const alb_scatter *scatter);
-
-// Tables over 0 .. end_mm; that of P is left out where it would be wrong by more than 1e-6 of P.
-bool alb_radial_create(alb_radial *radial, const alb_profile profiles[3], double end_mm, alb_error *error);
-void alb_radial_free(alb_radial *radial);
-
-double alb_longest_edge(const alb_vector triangle[3]);
-// Integral of S(|x - p|) over the triangle for three profiles, 1 = all that leaves the plane at most.
-void alb_scatter_triangle(double integral[3], const alb_radial *radial, const alb_vector triangle[3], alb_vector p);
-// The same by seven points, for p further from the triangle's middle than 1.25 of its longest edge.
-void alb_scatter_triangle_from_afar(double integral[3], const alb_radial *radial, const alb_vector triangle[3],
-                                    alb_vector p);

@@ -61,7 +61,7 @@ static bool check_scattering(alb_solution *s, const alb_scene *scene, alb_error 
 
 static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
-    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, error))
+    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, 0.005, error))
         return false;
     s->bytes[ALB_STAGE_SCATTERING] = alb_scatter_bytes(&s->scatter);
     return check_scattering(s, scene, error);
@@ -91,8 +91,11 @@ static bool take_across(alb_solution *s, const alb_scene *scene, const double (*
         wanted |= scene->surfaces[i].slab && scene->surfaces[i].exits[ALB_TRANSMISSION].smooth;
     free(s->across);
     s->across = NULL;
-    return !wanted || ((s->across = alb_allocate(s->patches.count, sizeof *s->across, error)) &&
-                       alb_scatter_apply_across(s->across, &s->scatter, irradiance, error));
+    if (wanted && !(s->across = alb_allocate(s->patches.count, sizeof *s->across, error)))
+        return false;
+    if (wanted)
+        alb_scatter_apply_across(s->across, &s->scatter, irradiance);
+    return true;
 }
 
 // What the whole irradiance H = E + F B says.
@@ -228,8 +231,7 @@ bool alb_solution_relight(alb_solution *s, const alb_scene *scene, alb_error *er
 bool alb_solution_rematerial(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
     const double start_s = alb_clock_s();
-    alb_scatter_free(&s->scatter);
-    bool ok = scatter_patches(s, scene, error);
+    const bool ok = alb_scatter_rewrite(&s->scatter, scene->surfaces, error) && check_scattering(s, scene, error);
     s->seconds[ALB_STAGE_SCATTERING] = alb_clock_s() - start_s;
     if (ok)
         alb_radiosity_refresh(&s->equations);

@@ -78,7 +78,7 @@ static bool set_albedo(bench *b, double albedo, alb_error *error)
     b->surfaces[1] = (alb_surface){.name = "wax", .scatters = true};
     for (int c = 0; c < 3; c++) // 2 pi a / b^2 is the albedo
         b->surfaces[1].profiles[0][c] = (alb_profile){ALB_FORM_EXPONENTIAL, {albedo * 400 / (2 * M_PI), 20}};
-    return alb_scatter_create(&b->scatter, &b->patches, b->mesh.groups, b->surfaces, error) &&
+    return alb_scatter_create(&b->scatter, &b->patches, b->mesh.groups, b->surfaces, 0.005, error) &&
            alb_radiosity_create(&b->equations, &b->patches, &b->scatter, &b->factors, error);
 }
 

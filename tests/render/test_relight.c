@@ -80,11 +80,14 @@ static void solutions_can_change(void **state)
                  &error);
         const int products = s.report.iterations;
         check_ok(alb_solution_create(&fresh, &scene, &error), &error);
-        // both to a residual of 1e-5; an error is at most 1 / (1 - 0.8) times that
-        check_below(difference(&s, (const alb_rgb *)s.radiosity, (const alb_rgb *)fresh.radiosity), 1e-4);
+        // both to a residual of 1e-5; an error is at most 1 / (1 - 0.8) times that. Links stay those of the first
+        // materials, within 0.5 % of exact as the fresh ones are
+        check_below(difference(&s, (const alb_rgb *)s.radiosity, (const alb_rgb *)fresh.radiosity),
+                    change < 3 ? 1e-4 : 2e-3);
         for (int c = 0; c < 3; c++) {
             check_near(s.balance.in[c], fresh.balance.in[c], 1e-12 + 1e-9 * fresh.balance.in[c]);
-            check_near(s.balance.absorbed[c], fresh.balance.absorbed[c], 1e-4 * fresh.balance.in[c]);
+            check_near(s.balance.absorbed[c], fresh.balance.absorbed[c],
+                       (change < 3 ? 1e-4 : 2e-3) * fresh.balance.in[c]);
         }
         if (change == 0)
             assert_true(products < fresh.report.iterations);

@@ -55,8 +55,8 @@ bool scene_bowls(alb_scene *scene, double detail, int frame, alb_error *error)
     for (int k = 0; ok && k < 3; k++) {
         double outline[2 * ARC + 10][2];
         const int count = bowl_outline(outline, radius[k], 5);
-        ok = shape_lathe(&scene->mesh, (const double(*)[2])outline, count, feet[k], 2.9 / detail,
-                         (uint16_t)(GREEN + k), error);
+        ok = shape_lathe(&scene->mesh, (const double(*)[2])outline, count, feet[k], 2.9 / detail, (uint16_t)(GREEN + k),
+                         error);
     }
     if (ok && animal_add(&scene->mesh, (alb_vector){10, -65, 0.5}, 2.04 / detail, 1, WAX, error))
         return true;

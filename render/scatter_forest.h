@@ -1,0 +1,58 @@
+// The sources of scattering in clusters: a binary tree for each face of each body, its leaves patches.
+#pragma once
+#include "render/scatter.h"
+
+// Exit patches are taken in blocks of so many consecutive leaves.
+enum { ALB_BLOCK = 8 };
+
+// The runs of a body: faces of a slab, and what is neither (all of a solid).
+enum { ALB_FACE_FRONT, ALB_FACE_EDGE, ALB_FACE_BACK, ALB_FACES };
+
+typedef struct alb_cluster {
+    float centre_mm[3]; // relative to the body's middle
+    float moments[6];   // xx, yy, zz, xy, xz, yz: variances of a point of it, mm^2
+    float radius_mm;    // no vertex is further from the centre
+    float spread_mm2;   // half the trace of the moments: the variance along any direction of its plane, if alike
+    float area_mm2;
+    uint32_t leaf; // one near the centre
+} alb_cluster;
+
+// A cluster as a product sees it. The light, area times irradiance of R, G and B, and its first moments about the
+// centre along x, y and z, in which the last element stays: the centre.
+typedef struct alb_scatter_node {
+    float light[3], spread_mm2;
+    float moments[3][4];
+} alb_scatter_node;
+
+typedef struct alb_tree {
+    uint32_t body, first_node, first_leaf, leaf_count;
+    uint16_t surface;
+    uint8_t face;
+    float axis[3];        // slab: normal of its faces
+    alb_vector middle_mm; // of the body
+} alb_tree;
+
+// Nodes of a tree stand in depth-first order. A cluster of n leaves has 2 n - 1 nodes; its children are the next one,
+// with alb_left_count(n) leaves, and the one 2 alb_left_count(n) further on.
+typedef struct alb_forest {
+    size_t tree_count, leaf_count, node_count;
+    alb_tree *trees;
+    uint32_t *patches;       // of the leaves
+    float *areas_mm2;        // of the leaves
+    alb_scatter_node *nodes; // workspace of a product
+    alb_cluster *clusters;   // of the nodes; only while links are made
+} alb_forest;
+
+static inline uint32_t alb_left_count(uint32_t count)
+{
+    return count <= ALB_BLOCK ? count / 2 : (count / 2 + ALB_BLOCK - 1) / ALB_BLOCK * ALB_BLOCK;
+}
+
+bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_patches *patches,
+                       const uint16_t *materials, const alb_surface *surfaces, alb_error *error);
+void alb_forest_free(alb_forest *forest);
+// Covariance of a point of the triangle, in the order of alb_cluster.
+void alb_moments_of_triangle(float moments[6], alb_vector a, alb_vector b, alb_vector c);
+// Fills the nodes from the irradiance of the patches.
+void alb_forest_gather(alb_forest *forest, const double (*irradiance)[3]);
+size_t alb_forest_bytes(const alb_forest *forest);

@@ -1,0 +1,72 @@
+// The integral of a radial profile over a triangle as a sum over its edges (Gauss's theorem in polar coordinates about
+// the foot of p on the triangle's plane, h the height of p, d the signed distance of the foot from an edge's line):
+//     integral s(|x - p|) dA = sum over edges  sign(d) integral [P(sqrt(h^2 + rho^2)) - P(h)] dtheta,
+//     P(r) = integral_0^r s(r) r dr
+// Along an edge, at t from the perpendicular, t = |d| sinh w: rho = |d| cosh w, dtheta = dw / cosh w. In w the profile
+// turns over within a step of about one, however narrow it is, and Gauss-Legendre with five points an edge does: 1e-3
+// of the row's sum for well-shaped triangles, 1.5e-2 at worst where w goes to 5 (aspect 100). The weights of an
+// edge are scaled to the angle that it spans, so that of a profile that ends inside the patch nothing is lost.
+//
+// Nothing of this depends on the profile: distances and weights stay, a change of profile is table look-ups.
+#include "render/scatter_rule.h"
+
+enum { PER_EDGE = (ALB_RULE_NODES - 1) / 3, WHOLE_CODE = UINT16_MAX, WHOLE_TURN = INT16_MAX };
+
+static const double nodes[PER_EDGE] = {-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
+                                       0.9061798459386640};
+static const double shares[PER_EDGE] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889, 0.4786286704993665,
+                                        0.2369268850561891};
+
+// Distances in the plane and signed angles of one edge from a to b, about the origin.
+static void take_edge(double distances[PER_EDGE], double angles[PER_EDGE], alb_vector a, alb_vector b,
+                      alb_vector normal)
+{
+    const alb_vector along = alb_unit(alb_sub(b, a));
+    const double from = alb_dot(along, a), to = alb_dot(along, b), signed_d = alb_dot(alb_cross(along, normal), a),
+                 d = fmax(fabs(signed_d), 1e-9 * (to - from));
+    const double low = asinh(from / d), high = asinh(to / d), half = 0.5 * (high - low);
+    const double angle = copysign(atan2(to, d) - atan2(from, d), signed_d);
+    double sum = 0;
+    for (int k = 0; k < PER_EDGE; k++) {
+        const double stretch = cosh(0.5 * (low + high) + half * nodes[k]);
+        distances[k] = d * stretch;
+        angles[k] = shares[k] / stretch;
+        sum += angles[k];
+    }
+    for (int k = 0; k < PER_EDGE; k++)
+        angles[k] *= fabs(signed_d) > 1e-9 * (to - from) ? angle / sum : 0; // seen edge-on: no angle
+}
+
+void alb_rule_find(alb_rule *rule, const alb_vector triangle[3], alb_vector p, double near_mm)
+{
+    double distances[ALB_RULE_NODES - 1], angles[ALB_RULE_NODES - 1], below = 0;
+    const alb_vector normal = alb_unit(alb_cross(alb_sub(triangle[1], triangle[0]), alb_sub(triangle[2], triangle[0])));
+    const double height = alb_dot(normal, alb_sub(p, triangle[0]));
+    const alb_vector foot = alb_sub(p, alb_times(height, normal));
+    for (int k = 0; k < 3; k++)
+        take_edge(distances + k * PER_EDGE, angles + k * PER_EDGE, alb_sub(triangle[k], foot),
+                  alb_sub(triangle[(k + 1) % 3], foot), normal);
+    for (int k = 0; k < ALB_RULE_NODES - 1; k++) { // rounded so that they add up to the whole
+        const double next = below + angles[k] / (2 * M_PI), distance = hypot(distances[k], height);
+        rule->weights[k] = (int16_t)(lrint(next * WHOLE_TURN) - lrint(below * WHOLE_TURN));
+        rule->codes[k] = (uint16_t)lrint(fmin(sqrt(distance / near_mm), 1) * WHOLE_CODE);
+        below = next;
+    }
+    rule->weights[ALB_RULE_NODES - 1] = (int16_t)-lrint(below * WHOLE_TURN);
+    rule->codes[ALB_RULE_NODES - 1] = (uint16_t)lrint(fmin(sqrt(fabs(height) / near_mm), 1) * WHOLE_CODE);
+}
+
+void alb_rule_apply(double integral[3], const alb_rule *rule, const alb_scatter_kernel *kernel)
+{
+    integral[0] = integral[1] = integral[2] = 0;
+    for (int k = 0; k < ALB_RULE_NODES; k++) {
+        const double u = (double)rule->codes[k] / WHOLE_CODE, at = u * ALB_DISC_KNOTS;
+        const int knot = at < ALB_DISC_KNOTS ? (int)at : ALB_DISC_KNOTS - 1;
+        const double weight = 2 * M_PI * (double)rule->weights[k] / WHOLE_TURN * u * u * kernel->near_mm;
+        const float *low = kernel->discs[knot], *high = kernel->discs[knot + 1];
+        for (int c = 0; c < 3; c++)
+            integral[c] += weight * ((double)low[c] + (at - knot) * ((double)high[c] - (double)low[c]));
+    }
+    for (int c = 0; c < 3; c++)
+        integral[c] = fmax(0, integral[c]); // quadrature noise where the profile has died away
+}
