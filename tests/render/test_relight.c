@@ -126,6 +126,7 @@ static void narrow_relighting_states_its_error(void **state)
     }
     check_below(narrow[2].error_percent, 2); // 256 rays hold reciprocity to about 1 % on a mesh of 1,000
     // linear, to the step of 16 bits
+    alb_relight_apply(found, &narrow[2], (const alb_rgb *)s.irradiance);
     alb_rgb *light = calloc(s.patches.count, sizeof *light), *both = calloc(s.patches.count, sizeof *both);
     for (size_t p = 0; p < s.patches.count; p++)
         for (int c = 0; c < 3; c++)
