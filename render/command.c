@@ -252,9 +252,8 @@ const alb_command alb_render_command = {
         "  --png PICTURE.png  where the PNG goes instead of PICTURE.png\n"
         "  --mesh OUT.ply     the mesh with the radiosity of each face (red, green, blue, float)\n"
         "  --error PERCENT    rays until the irradiance by rays errs by no more than this, rms; for error_percent\n"
-        "  --json             patches, rays, links, products, residual, stated error, row sums, balance of flux, "
-        "seconds and bytes per "
-        "stage\n"
+        "  --json             patches, rays, links, products, residual, stated error, row sums, balance of flux,\n"
+        "                     and the seconds and bytes of each stage\n"
         "The scene file is described in render/scene.h.\n",
     .run = run,
 };
