@@ -13,7 +13,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WINDOWS = 1 << 17, LOOK_AGAIN = 64 };
+enum { WINDOWS = 1 << 17, LOOK_AGAIN = 256 };
+
+static inline double norm(double x, double y) { return sqrt(x * x + y * y); }
 
 typedef struct alb_window {
     uint32_t place; // 3 * triangle + edge by which it enters the triangle
@@ -142,11 +144,11 @@ typedef struct offer {
 static bool is_beaten(const alb_geodesic_memory *m, const offer *o, uint32_t v1, uint32_t v2)
 {
     const double slack = 1e-12 * (o->sigma + o->length + o->y);
-    const double to_b0 = o->sigma + hypot(o->x - o->b0, o->y) - slack,
-                 to_b1 = o->sigma + hypot(o->x - o->b1, o->y) - slack;
+    const double to_b0 = o->sigma + norm(o->x - o->b0, o->y) - slack,
+                 to_b1 = o->sigma + norm(o->x - o->b1, o->y) - slack;
     const double b = o->third_beyond_b1 ? o->b1 : o->b0, to_b = o->third_beyond_b1 ? to_b1 : to_b0;
     return to_b1 > distance_of(m, v1) + o->b1 || to_b0 > distance_of(m, v2) + (o->length - o->b0) ||
-           to_b > distance_of(m, o->third) + hypot(b - o->third_x, o->third_y);
+           to_b > distance_of(m, o->third) + norm(b - o->third_x, o->third_y);
 }
 
 // Enters the window into the triangle across its edge.
@@ -155,18 +157,18 @@ static void take(geodesic *g, offer *o)
     const alb_geodesic_surface *s = g->surface;
     alb_geodesic_memory *m = g->memory;
     const double tiny = 1e-12 * o->length;
-    o->b0 = fmax(o->b0, 0), o->b1 = fmin(o->b1, o->length);
+    o->b0 = o->b0 > 0 ? o->b0 : 0, o->b1 = o->b1 < o->length ? o->b1 : o->length;
     if (!(o->b1 - o->b0 > tiny))
         return;
     const uint32_t v1 = s->corners[o->triangle][o->edge], v2 = s->corners[o->triangle][(o->edge + 1) % 3];
     if (is_beaten(m, o, v1, v2))
         return;
     if (o->b0 <= tiny)
-        reach_vertex(g, v1, o->sigma + hypot(o->x, o->y));
+        reach_vertex(g, v1, o->sigma + norm(o->x, o->y));
     if (o->b1 >= o->length - tiny)
-        reach_vertex(g, v2, o->sigma + hypot(o->x - o->length, o->y));
+        reach_vertex(g, v2, o->sigma + norm(o->x - o->length, o->y));
     const double past = o->x < o->b0 ? o->b0 - o->x : o->x > o->b1 ? o->x - o->b1 : 0;
-    const double nearest = o->sigma + hypot(past, o->y);
+    const double nearest = o->sigma + norm(past, o->y);
     const uint32_t across = s->neighbours[o->triangle][o->edge];
     if (across == UINT32_MAX || nearest > g->reach_mm)
         return;
@@ -206,7 +208,7 @@ static void cast(geodesic *g, const unfolded *u, const window *w, bool right, do
                .third = right ? u->first : u->second,
                .edge = (u->edge + (right ? 1 : 2)) % 3,
                .third_beyond_b1 = !right,
-               .length = hypot(q.x - p.x, q.y - p.y),
+               .length = norm(q.x - p.x, q.y - p.y),
                .sigma = w->sigma};
     if (!(o.length > 0))
         return;
@@ -227,7 +229,7 @@ static void carry(geodesic *g, const unfolded *u, const window *w)
 {
     const double tall = w->y + u->y, at = tall > 0 ? w->x + (u->x - w->x) * w->y / tall : w->x;
     if (at >= w->b0 && at <= w->b1)
-        reach_vertex(g, u->third, w->sigma + hypot(u->x - w->x, tall));
+        reach_vertex(g, u->third, w->sigma + norm(u->x - w->x, tall));
     if (w->b1 > at)
         cast(g, u, w, true, w->b1, fmax(w->b0, at), w->b0 <= at);
     if (w->b0 < at)
@@ -284,11 +286,11 @@ static void shine(geodesic *g, const unfolded *u, const window *w)
         const alb_vector at = alb_sub(target->at, a), end = alb_sub(target->end, a);
         const double px = alb_dot(at, e), py = fmax(alb_dot(at, up), 0), tall = w->y + py;
         const double ray = tall > 0 ? w->x + (px - w->x) * w->y / tall : px, slack = 1e-9 * u->length;
-        const double length = w->sigma + hypot(px - w->x, tall);
+        const double length = w->sigma + norm(px - w->x, tall);
         if (ray < w->b0 - slack || ray > w->b1 + slack || !(length < target->to_at_mm))
             continue;
         target->to_at_mm = length;
-        target->distance_mm = w->sigma + hypot(alb_dot(end, e) - w->x, alb_dot(end, up) + w->y);
+        target->distance_mm = w->sigma + norm(alb_dot(end, e) - w->x, alb_dot(end, up) + w->y);
     }
 }
 
@@ -325,8 +327,8 @@ static double furthest(const alb_geodesic_target *targets, size_t count, size_t 
     for (size_t i = 0; i < count; i += alternatives) {
         double nearest = (double)INFINITY;
         for (size_t k = 0; k < alternatives; k++)
-            nearest = fmin(nearest, targets[i + k].to_at_mm);
-        most = fmax(most, nearest);
+            nearest = targets[i + k].to_at_mm < nearest ? targets[i + k].to_at_mm : nearest;
+        most = nearest > most ? nearest : most;
     }
     return most;
 }

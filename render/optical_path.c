@@ -28,13 +28,14 @@ static bool has_inside(const alb_voxels *voxels)
     return false;
 }
 
-// Twice the patches' size, or what makes the graph so small that a search of it takes milliseconds.
+// Three times the patches' size, or what leaves some two thousand nodes: a search takes a few milliseconds then. How
+// coarse the graph is decides which way a path goes, not its length: that is pulled tight about the triangles.
 static double default_voxel_mm(const alb_body *body, const alb_patches *patches)
 {
     double size = 0;
     for (size_t i = 0; i < body->count; i++)
         size += sqrt(patches->areas_mm2[body->patches[i]]);
-    return 3 * size / (double)body->count;
+    return fmax(3, sqrt((double)body->count / 1000)) * size / (double)body->count;
 }
 
 static void describe(alb_optical_paths *paths, const alb_body *body, double share, double limit_mm)

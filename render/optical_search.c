@@ -209,7 +209,6 @@ void alb_search_run(alb_search *search, const alb_optical_solid *solid, uint32_t
 {
     const float limit = (float)(solid->reach_mm + 2 * solid->turns.size_mm);
     search->source = source;
-    search->searches++;
     if (++search->stamp == 0) {
         memset(search->stamps, 0, solid->turns.count * sizeof *search->stamps);
         search->stamp = 1;

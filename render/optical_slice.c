@@ -9,9 +9,11 @@
 // to where both sides meet the edge at one angle. What remains is second order in the angle between the plane and the
 // true path.
 #include "render/optical_solid.h"
+#include <string.h>
 
-enum { CROSSINGS = 48, POINTS = 1024, SWEEPS = 4 };
-static const double worth_turning = 1.05; // detour beyond which other planes are tried
+enum { CROSSINGS = 48, POINTS = 1024, SWEEPS = 3 };
+// Detours beyond which corners are moved along their edges, and other planes are tried.
+static const double worth_moving = 1.02, worth_turning = 1.07;
 
 typedef struct plane {
     alb_vector origin, along, up, normal; // along the chord; up: the side of the path
@@ -19,24 +21,18 @@ typedef struct plane {
 
 // Where the section crosses an edge of the mesh.
 typedef struct cut {
-    double x, y; // along the chord, and up
-    alb_vector a, b;
-    uint32_t triangle;
-    int order; // along the curve; the next curve begins with a gap
+    double x, y;    // along the chord, and up
+    uint32_t place; // 3 * triangle + edge
+    int order;      // along the curve; the next curve begins with a gap
 } cut;
 
 static double height(const plane *p, alb_vector v) { return alb_dot(p->normal, alb_sub(v, p->origin)); }
 
-// The cut of edge k of the triangle; false where both ends lie on one side. A corner in the plane counts as above it.
-static bool cut_edge(cut *out, const alb_surface_net *net, uint32_t triangle, int k, const plane *p)
+// Between a and b at heights of different sign above the plane.
+static cut cut_at(const plane *p, alb_vector a, alb_vector b, double ha, double hb, uint32_t place)
 {
-    const alb_vector a = net->triangles[triangle][k], b = net->triangles[triangle][(k + 1) % 3];
-    const double ha = height(p, a), hb = height(p, b);
-    if ((ha >= 0) == (hb >= 0))
-        return false;
     const alb_vector at = alb_sub(alb_add(a, alb_times(ha / (ha - hb), alb_sub(b, a))), p->origin);
-    *out = (cut){.x = alb_dot(at, p->along), .y = alb_dot(at, p->up), .a = a, .b = b, .triangle = triangle};
-    return true;
+    return (cut){.x = alb_dot(at, p->along), .y = alb_dot(at, p->up), .place = place};
 }
 
 static int entry_of(const alb_crossing *crossings, size_t count, uint32_t triangle)
@@ -48,29 +44,40 @@ static int entry_of(const alb_crossing *crossings, size_t count, uint32_t triang
 }
 
 // Follows the curve (its number for the order) from where the chord leaves, upwards, until it is back at the chord. The
-// crossing by which it returns, or -1.
+// crossing by which it returns, or -1. A corner in the plane counts as above it.
 static int follow(cut *cuts, int *cut_count, int curve, const alb_surface_net *net, const plane *p,
                   const alb_crossing *crossings, size_t crossing_count, uint32_t triangle)
 {
-    cut best = {0}, found;
-    int edge = -1;
-    for (int k = 0; k < 3; k++)
-        if (cut_edge(&found, net, triangle, k, p) && (edge < 0 || found.y > best.y))
-            best = found, edge = k;
-    while (edge >= 0 && *cut_count < POINTS) {
+    const alb_vector *t = net->triangles[triangle];
+    const double heights[3] = {height(p, t[0]), height(p, t[1]), height(p, t[2])};
+    cut best = {.place = UINT32_MAX};
+    for (int k = 0; k < 3; k++) {
+        const double ha = heights[k], hb = heights[(k + 1) % 3];
+        if ((ha >= 0) == (hb >= 0))
+            continue;
+        const cut found = cut_at(p, t[k], t[(k + 1) % 3], ha, hb, 3 * triangle + (uint32_t)k);
+        if (best.place == UINT32_MAX || found.y > best.y)
+            best = found;
+    }
+    if (best.place == UINT32_MAX)
+        return -1;
+    while (*cut_count < POINTS) {
         best.order = *cut_count + curve;
         cuts[(*cut_count)++] = best;
-        const uint32_t across = net->neighbours[triangle][edge];
+        const uint32_t across = net->neighbours[best.place / 3][best.place % 3];
         if (across == UINT32_MAX)
             return -1;
-        triangle = across / 3;
-        const int entry = entry_of(crossings, crossing_count, triangle), came = (int)(across % 3);
+        const uint32_t next = across / 3, came = across % 3;
+        const int entry = entry_of(crossings, crossing_count, next);
         if (entry >= 0)
             return entry;
-        edge = -1;
-        for (int k = 0; k < 3 && edge < 0; k++)
-            if (k != came && cut_edge(&best, net, triangle, k, p))
-                edge = k;
+        // One of the two other edges, from the corner opposite.
+        t = net->triangles[next];
+        const uint32_t third = (came + 2) % 3, after = (came + 1) % 3;
+        const alb_vector came_from = t[came], came_to = t[after];
+        const double h_from = height(p, came_from), h_to = height(p, came_to), hc = height(p, t[third]);
+        best = (hc >= 0) == (h_from >= 0) ? cut_at(p, came_to, t[third], h_to, hc, 3 * next + after)
+                                          : cut_at(p, t[third], came_from, hc, h_from, 3 * next + third);
     }
     return -1;
 }
@@ -120,14 +127,16 @@ static int tighten(cut *cuts, int count, double length)
     return kept;
 }
 
+static double root_of(double x) { return x > 0 ? sqrt(x) : 0; }
+
 // Where on the edge a path from p to q over it is shortest: both unfolded into one plane.
 static alb_vector on_edge(alb_vector a, alb_vector b, alb_vector p, alb_vector q)
 {
     const alb_vector e = alb_sub(b, a), pa = alb_sub(p, a), qa = alb_sub(q, a);
     const double length = alb_length(e), zp = alb_dot(pa, e) / length, zq = alb_dot(qa, e) / length;
-    const double rp = sqrt(fmax(0, alb_dot(pa, pa) - zp * zp)), rq = sqrt(fmax(0, alb_dot(qa, qa) - zq * zq));
+    const double rp = root_of(alb_dot(pa, pa) - zp * zp), rq = root_of(alb_dot(qa, qa) - zq * zq);
     const double z = rp + rq > 0 ? (zp * rq + zq * rp) / (rp + rq) : 0.5 * (zp + zq);
-    return alb_add(a, alb_times(fmin(fmax(z / length, 0), 1), e));
+    return alb_add(a, alb_times(z < 0 ? 0 : z > length ? 1 : z / length, e));
 }
 
 static double length_of(const alb_bends *bends)
@@ -153,13 +162,9 @@ static bool legs_are_inside(const alb_bends *bends, const cut *hull, int kept, c
 // The mean normal of the triangles on both sides of the edge that is cut.
 static alb_vector normal_at(const cut *c, const alb_surface_net *net)
 {
-    for (int k = 0; k < 3; k++) {
-        const alb_vector a = net->triangles[c->triangle][k];
-        const uint32_t across = net->neighbours[c->triangle][k];
-        if (a.x == c->a.x && a.y == c->a.y && a.z == c->a.z && across != UINT32_MAX)
-            return alb_unit(alb_add(net->normals[c->triangle], net->normals[across / 3]));
-    }
-    return net->normals[c->triangle];
+    const uint32_t across = net->neighbours[c->place / 3][c->place % 3];
+    const alb_vector normal = net->normals[c->place / 3];
+    return across == UINT32_MAX ? normal : alb_unit(alb_add(normal, net->normals[across / 3]));
 }
 
 // Measures the corners as they are, then moves them off the surface; false where a leg leaves the body.
@@ -181,14 +186,19 @@ static bool string(alb_bends *bends, const cut *hull, int kept, const alb_optica
     bends->at[0] = from, bends->at[kept + 1] = to;
     for (int i = 0; i < kept; i++)
         bends->at[i + 1] = alb_add(p->origin, alb_add(alb_times(hull[i].x, p->along), alb_times(hull[i].y, p->up)));
-    alb_bends moved = *bends;
+    if (length_of(bends) < worth_moving * alb_length(alb_sub(to, from)))
+        return finish(bends, hull, kept, solid);
+    alb_vector planar[ALB_BENDS_MAX];
+    memcpy(planar, bends->at, (size_t)bends->count * sizeof *planar);
     for (int sweep = 0; sweep < SWEEPS; sweep++)
-        for (int i = 0; i < kept; i++)
-            moved.at[i + 1] = on_edge(hull[i].a, hull[i].b, moved.at[i], moved.at[i + 2]);
-    if (finish(&moved, hull, kept, solid)) {
-        *bends = moved;
+        for (int i = 0; i < kept; i++) {
+            const alb_vector *t = solid->net.triangles[hull[i].place / 3];
+            const uint32_t k = hull[i].place % 3;
+            bends->at[i + 1] = on_edge(t[k], t[(k + 1) % 3], bends->at[i], bends->at[i + 2]);
+        }
+    if (finish(bends, hull, kept, solid))
         return true;
-    }
+    memcpy(bends->at, planar, (size_t)bends->count * sizeof *planar);
     return finish(bends, hull, kept, solid);
 }
 
@@ -252,7 +262,7 @@ bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, alb_vector
         if (ok && lowest.length_mm < bends->length_mm)
             *bends = lowest, best = turned(up, along, angle);
         up = best;
-        if (bends->length_mm > (1 - 1e-3) * before)
+        if (bends->length_mm > (1 - 2e-3) * before)
             break;
     }
     return true;

@@ -7,12 +7,11 @@
 #include "render/optical_solid.h"
 #include "base/memory.h"
 #include <stdlib.h>
-#include <string.h>
 
-// A section that is longer than this times its chord is compared with the graph's path.
-static const double trusted_detour = 1.2;
-static const double worth_pulling = 1.15; // of the section; what pulling gains at most, commonly
-enum { FINE_VOXELS = 6000000, ROUNDS = 3, CHAIN = 64, TOUCHES = 16 };
+// A section that is longer than this times its chord is compared with the graph's path; and how much longer than the
+// section that may be before it is pulled, for pulling to gain so much is rare.
+static const double trusted_detour = 1.2, worth_pulling = 1.15;
+enum { FINE_VOXELS = 6000000, TOUCHES = 16 };
 
 static bool fill_starts(alb_optical_solid *solid, alb_error *error)
 {
@@ -60,136 +59,53 @@ void alb_optical_solid_free(alb_optical_solid *solid)
     *solid = (alb_optical_solid){0};
 }
 
-static void put(alb_bends *path, alb_vector at)
+static alb_vector node_at(const alb_turns *turns, uint32_t node)
 {
-    if (path->count < ALB_BENDS_MAX)
-        path->at[path->count++] = at;
+    return (alb_vector){(double)turns->at[node][0], (double)turns->at[node][1], (double)turns->at[node][2]};
 }
 
-// Leaves out corners whose neighbours see each other.
-static bool shorten(alb_bends *path, const alb_optical_solid *solid)
+// The graph's path between two pieces of surface, with ends of its own where given; false where there is none.
+static bool graph_path(alb_bends *path, alb_search *search, const alb_optical_solid *solid, uint32_t source,
+                       uint32_t target, alb_vector start, alb_vector end)
 {
-    int kept = 1;
-    for (int i = 1; i + 1 < path->count; i++)
-        if (!alb_voxels_inside(&solid->voxels, path->at[kept - 1], path->at[i + 1]))
-            path->at[kept++] = path->at[i];
-    path->at[kept++] = path->at[path->count - 1];
-    const bool fewer = kept < path->count;
-    path->count = kept;
-    return fewer;
-}
-
-static double between(const alb_bends *path, int first, int last)
-{
-    double length = 0;
-    for (int i = first; i < last; i++)
-        length += alb_length(alb_sub(path->at[i + 1], path->at[i]));
-    return length;
-}
-
-// Replaces what lies between two corners by the section through them and the mean of the corners, or the best one
-// turned from it, where that is shorter.
-static bool pull(alb_bends *path, const alb_optical_solid *solid, int first, int last, bool turn)
-{
-    alb_bends section;
-    const alb_vector from = path->at[first], to = path->at[last], along = alb_unit(alb_sub(to, from));
-    alb_vector towards = {0};
-    for (int i = first + 1; i < last; i++) {
-        const alb_vector at = alb_sub(path->at[i], from);
-        towards = alb_add(towards, alb_sub(at, alb_times(alb_dot(at, along), along)));
-    }
-    if (!(turn ? alb_slice_best : alb_slice)(&section, solid, from, to, towards) ||
-        !(section.length_mm < between(path, first, last)))
-        return false;
-    const int more = section.count - (last - first + 1); // corners
-    if (path->count + more > ALB_BENDS_MAX)
-        return false;
-    memmove(&path->at[last + more], &path->at[last], (size_t)(path->count - last) * sizeof *path->at);
-    memcpy(&path->at[first + 1], &section.at[1], (size_t)(section.count - 2) * sizeof *path->at);
-    path->count += more;
-    return true;
-}
-
-// All of it, then halves that overlap, then quarters, until corner by corner; less where the whole could be replaced
-// and parts gain nothing.
-static void tighten(alb_bends *path, const alb_optical_solid *solid)
-{
-    const bool whole = pull(path, solid, 0, path->count - 1, true);
-    for (int span = path->count / 2; span > 1; span = span > 3 ? span / 2 : span - 1) {
-        const double before = between(path, 0, path->count - 1);
-        for (int first = 0; first + 2 < path->count; first += (span + 1) / 2)
-            pull(path, solid, first, first + span < path->count - 1 ? first + span : path->count - 1, false);
-        if (whole && between(path, 0, path->count - 1) > (1 - 3e-4) * before)
-            break;
-    }
-}
-
-// Length; a leg that is blocked (within a piece of surface, or between joined ones) is measured along its section.
-static double length_of(const alb_bends *path, const alb_optical_solid *solid)
-{
-    double length = 0;
-    for (int i = 1; i < path->count; i++) {
-        const alb_vector a = path->at[i - 1], b = path->at[i];
-        alb_bends section;
-        alb_vector towards;
-        section.length_mm = alb_length(alb_sub(b, a));
-        if (!alb_voxels_inside(&solid->voxels, a, b) && alb_slice_direction(&towards, solid, a, b) &&
-            !alb_slice(&section, solid, a, b, towards))
-            section.length_mm = alb_length(alb_sub(b, a));
-        length += section.length_mm;
-    }
-    return length;
-}
-
-// The graph's path: its corners, backwards, with the pieces of surface at both ends. False where there is none.
-static bool graph_path(alb_bends *path, alb_search *search, const alb_optical_solid *solid, uint32_t from, uint32_t to)
-{
-    const alb_turns *turns = &solid->turns;
-    const uint32_t source = turns->of_triangle[from], target = turns->of_triangle[to];
+    alb_vector chain[ALB_BENDS_MAX / 2];
+    int count = 0;
     if (search->source != source)
         alb_search_run(search, solid, source);
     if (!alb_search_found(search, target))
         return false;
-    path->count = 0;
-    put(path, solid->starts[to]);
-    for (uint32_t node = target;; node = search->parents[node]) {
-        put(path, (alb_vector){(double)turns->at[node][0], (double)turns->at[node][1], (double)turns->at[node][2]});
-        if (node == source || path->count >= CHAIN)
+    for (uint32_t node = target; count < ALB_BENDS_MAX / 2; node = search->parents[node]) {
+        chain[count++] = node_at(&solid->turns, node);
+        if (node == source)
             break;
     }
-    put(path, solid->starts[from]);
+    path->count = 0;
+    path->at[path->count++] = start;
+    while (count > 0)
+        path->at[path->count++] = chain[--count];
+    path->at[path->count++] = end;
     return true;
 }
 
-// Pulls it tight and measures it; *last is its last corner before the end.
-static double pulled(alb_vector *last, alb_bends *path, const alb_optical_solid *solid)
+// The path around what is in the way of a chord; its length INFINITY where none was found. The two points lie on, or
+// are, the two pieces of surface.
+static void go_around(alb_bends *path, alb_search *search, const alb_optical_solid *solid, uint32_t source,
+                      uint32_t target, alb_vector start, alb_vector end)
 {
-    shorten(path, solid);
-    double length = length_of(path, solid);
-    for (int round = 0; round < ROUNDS; round++) {
-        tighten(path, solid);
-        shorten(path, solid);
-        const double before = length;
-        length = fmin(length, length_of(path, solid));
-        if (length > (1 - 1e-4) * before)
-            break;
-    }
-    *last = path->at[1];
-    return length;
-}
-
-// Its length to first order: from end to end without the pieces of surface there.
-static double estimate(const alb_bends *path)
-{
-    double length = 0;
-    for (int i = 1; i < path->count; i++) {
-        const bool end = path->count > 4 && (i == 1 || i == path->count - 1);
-        if (!end && path->count > 4 && (i == 2 || i == path->count - 2))
-            length += alb_length(alb_sub(path->at[i == 2 ? 0 : i + 1], path->at[i == 2 ? 2 : i - 1]));
-        else if (!end)
-            length += alb_length(alb_sub(path->at[i], path->at[i - 1]));
-    }
-    return length;
+    alb_bends other;
+    alb_vector towards;
+    path->length_mm = (double)INFINITY;
+    path->count = 2, path->at[0] = start, path->at[1] = end;
+    if (!(alb_slice_direction(&towards, solid, start, end) && alb_slice_best(path, solid, start, end, towards)) &&
+        !alb_slice_any(path, solid, start, end))
+        path->length_mm = (double)INFINITY;
+    if (path->length_mm <= trusted_detour * alb_length(alb_sub(end, start)) ||
+        !graph_path(&other, search, solid, source, target, start, end) ||
+        (double)search->lengths[target] > worth_pulling * path->length_mm)
+        return;
+    alb_bends_pull(&other, solid);
+    if (other.length_mm < path->length_mm)
+        *path = other;
 }
 
 // Whether the chord is outside for no longer than rounding: through an edge or a corner.
@@ -213,23 +129,10 @@ double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *so
                                  alb_vector point)
 {
     const alb_vector start = solid->starts[from], end = solid->starts[to], middle = solid->net.middles[to];
-    const double chord = alb_length(alb_sub(middle, solid->net.middles[from]));
     if (from == to || alb_voxels_inside(&solid->voxels, start, end) || only_touches(solid, start, end))
         return alb_length(alb_sub(point, solid->net.middles[from]));
     alb_bends path;
-    alb_vector towards, last = start;
-    double best = (double)INFINITY;
-    if ((alb_slice_direction(&towards, solid, start, end) && alb_slice_best(&path, solid, start, end, towards)) ||
-        alb_slice_any(&path, solid, start, end)) {
-        best = path.length_mm;
-        last = path.at[path.count - 2];
-    }
-    if (best > trusted_detour * chord && graph_path(&path, search, solid, from, to) &&
-        estimate(&path) < worth_pulling * best) {
-        alb_vector corner = {0};
-        const double other = pulled(&corner, &path, solid);
-        if (other < best)
-            best = other, last = corner;
-    }
-    return best - alb_length(alb_sub(middle, last)) + alb_length(alb_sub(point, last));
+    go_around(&path, search, solid, solid->turns.of_triangle[from], solid->turns.of_triangle[to], start, end);
+    const alb_vector last = path.at[path.count - 2];
+    return path.length_mm - alb_length(alb_sub(middle, last)) + alb_length(alb_sub(point, last));
 }

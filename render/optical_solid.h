@@ -56,7 +56,7 @@ typedef struct alb_search {
     float *lengths;
     unsigned char *states;
     struct alb_heap_entry *heap;
-    size_t heap_count, heap_capacity, searches;
+    size_t heap_count, heap_capacity;
 } alb_search;
 bool alb_search_create(alb_search *search, size_t nodes, alb_error *error);
 void alb_search_free(alb_search *search);
@@ -75,6 +75,9 @@ bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, alb_vector
 bool alb_slice_any(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to);
 // Which half plane the surface where the chord leaves and returns speaks for; false where it does not.
 bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, alb_vector from, alb_vector to);
+
+// Pulls a path tight and measures it.
+void alb_bends_pull(alb_bends *path, const alb_optical_solid *solid);
 
 // The net, the voxels and the starts.
 bool alb_optical_solid_create(alb_optical_solid *solid, const alb_body *body, const alb_patches *patches,

@@ -35,7 +35,7 @@ static void walk_begin(walk *w, const alb_voxels *v, alb_vector from, alb_vector
     *w = (walk){.voxels = v, .start = {p.x, p.y, p.z}, .way = {d.x, d.y, d.z}};
     for (int a = 0; a < 3; a++) {
         w->inverse[a] = w->way[a] != 0 ? 1 / w->way[a] : (double)INFINITY;
-        w->longest = fmax(w->longest, fabs(w->way[a]));
+        w->longest = fabs(w->way[a]) > w->longest ? fabs(w->way[a]) : w->longest;
         w->cell[a] = clamped(floor(w->start[a]), v->n[a]);
     }
 }
@@ -61,7 +61,7 @@ static bool walk_step(walk *w)
         if (t < nearest)
             nearest = t, axis = a;
     }
-    w->t = fmax(w->t, nearest);
+    w->t = nearest > w->t ? nearest : w->t;
     w->cell[axis] += w->way[axis] > 0 ? 1 : -1;
     return nearest < 1 && w->cell[axis] >= 0 && w->cell[axis] < v->n[axis];
 }

@@ -4,8 +4,10 @@
 // worked out with nothing but segments against sides.
 #pragma once
 #include "render/patch.h"
+#include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { SQUARES = 24, REFLEX_CORNERS = 64, SIDES = 512 };
 
