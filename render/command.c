@@ -150,10 +150,12 @@ static bool print_json(const alb_scene *scene, const alb_solution *s, double vie
     alb_json_integer(&json, "rays_per_patch", s->factors.rays);
     alb_json_integer(&json, "rays", (long)s->factors.rows.first[s->patches.count]);
     alb_json_integer(&json, "rays_cast_again", (long)s->factors.reshot_rays);
+    alb_json_integer(&json, "links", (long)s->scatter.link_count);
     alb_json_integer(&json, "iterations", s->report.iterations);
     alb_json_number(&json, "residual", s->report.residual);
     alb_json_number(&json, "radiosity_bound_percent", 100 * s->bound);
     alb_json_number(&json, "rays_error_percent", s->rays_error_percent);
+    alb_json_number(&json, "stated_error_percent", s->stated_error_percent);
     alb_json_number(&json, "largest_row_sum", s->row_sum);
     alb_json_number(&json, "largest_column_sum", s->column_sum);
     alb_json_object(&json, "flux");
@@ -184,9 +186,9 @@ static bool report(const outputs *out, const alb_scene *scene, const alb_solutio
         total_s += s->seconds[i];
     if (out->json)
         return print_json(scene, s, view_s, exposure, error);
-    printf("%s: %zu patches, %d products to residual %.1e, rays' error %.2f %%, largest row sum %.4f, %.1f s\n",
-           out->picture, s->patches.count, s->report.iterations, s->report.residual, s->rays_error_percent, s->row_sum,
-           total_s);
+    printf("%s: %zu patches, %d products to residual %.1e, stated error %.2f %%, largest row sum %.4f, %.1f s\n",
+           out->picture, s->patches.count, s->report.iterations, s->report.residual, s->stated_error_percent,
+           s->row_sum, total_s);
     return true;
 }
 
@@ -250,8 +252,8 @@ const alb_command alb_render_command = {
         "  --png PICTURE.png  where the PNG goes instead of PICTURE.png\n"
         "  --mesh OUT.ply     the mesh with the radiosity of each face (red, green, blue, float)\n"
         "  --error PERCENT    rays until the irradiance by rays errs by no more than this, rms; for error_percent\n"
-        "  --json             patches, rays, products, residual, row sums, balance of flux, seconds and bytes per "
-        "stage\n"
+        "  --json             patches, rays, links, products, residual, stated error, row sums, balance of flux,\n"
+        "                     and the seconds and bytes of each stage\n"
         "The scene file is described in render/scene.h.\n",
     .run = run,
 };

@@ -1,6 +1,6 @@
 // Packing of hit lists, and their product with values per index:
 //     out_p = 1/R_p sum over the hits h of row p of value_h
-// The product walks block by block through all chunks, so that the 65,536 values of a block (1 MiB) stay in a core's
+// The product walks block by block through all chunks, so that the values of a block (at most 1 MiB) stay in a core's
 // cache; where the hits lie in a file it walks chunk by chunk, as the file does, and asks for the next chunk ahead. A
 // row adds its blocks in the same order either way: the same bytes. Up to 256 values are summed in single precision (in
 // four lanes, so 64 additions deep: 1e-7), these sums in double.
@@ -69,7 +69,8 @@ bool alb_hit_rows_create(alb_hit_rows *rows, const uint32_t *lengths, size_t cou
 {
     *rows = (alb_hit_rows){.count = count,
                            .chunks = (count + ALB_CHUNK_ROWS - 1) / ALB_CHUNK_ROWS,
-                           .blocks = (index_count + ALB_BLOCK_SIZE - 1) / ALB_BLOCK_SIZE};
+                           .blocks = (index_count + ALB_BLOCK_MAX - 1) / ALB_BLOCK_MAX};
+    rows->block_size = (index_count + rows->blocks - 1) / rows->blocks;
     const size_t parts = rows->chunks * rows->blocks;
     bool ok = (rows->first = alb_allocate(count + 1, sizeof *rows->first, error)) &&
               (rows->segments = alb_allocate(parts + 1, sizeof *rows->segments, error)) &&
@@ -163,13 +164,14 @@ void alb_hit_rows_fill(alb_hit_rows *rows, size_t chunk, uint32_t *hits, uint32_
     }
     uint16_t *out = rows->hits + begin;
     for (size_t block = 0; block < rows->blocks; block++) {
+        const uint32_t from = (uint32_t)(block * rows->block_size);
         uint16_t(*counts)[2] = counts_of(rows, chunk, block);
         rows->segments[chunk * rows->blocks + block] = (size_t)(out - rows->hits);
         for (size_t r = 0; r < n; r++)
             for (int half = 0; half < 2; half++) {
                 const uint32_t *at = places[r][half];
-                while (at < ends[r][half] && *at >> 16 == block)
-                    *out++ = (uint16_t)(*at++ & 0xffff);
+                while (at < ends[r][half] && *at < from + rows->block_size)
+                    *out++ = (uint16_t)(*at++ - from);
                 counts[r][half] = (uint16_t)(at - places[r][half]);
                 places[r][half] = at;
             }
@@ -187,7 +189,7 @@ void alb_hit_rows_read(uint32_t *hits, const alb_hit_rows *rows, size_t row)
             at += (size_t)counts[r][0] + counts[r][1];
         for (int half = 0; half < 2; half++)
             for (unsigned k = 0; k < counts[within][half]; k++)
-                *out[half]++ = (uint32_t)(block * ALB_BLOCK_SIZE + *at++);
+                *out[half]++ = (uint32_t)(block * rows->block_size + *at++);
     }
 }
 
@@ -225,7 +227,7 @@ ALB_VECTOR_CLONES static void gather(const product *p, size_t chunk, size_t bloc
     const alb_hit_rows *rows = p->rows;
     const uint16_t(*counts)[2] = (const uint16_t(*)[2])counts_of(rows, chunk, block);
     const uint16_t *hits = rows->hits + rows->segments[chunk * rows->blocks + block];
-    const float4 *values = p->values + block * ALB_BLOCK_SIZE;
+    const float4 *values = p->values + block * rows->block_size;
     double(*out)[3] = p->out + chunk * ALB_CHUNK_ROWS;
     const size_t n = rows_of(rows, chunk);
     for (size_t r = 0; r < n; r++) {
@@ -245,7 +247,7 @@ static void gather_difference(const product *p, size_t chunk, size_t block)
         for (int half = 0; half < 2; half++) {
             double sum[3] = {0};
             const double weight = (half ? -1.0 : 1.0) / (double)half_of(first[r + 1] - first[r], half);
-            add_hits(sum, hits, counts[r][half], p->values + block * ALB_BLOCK_SIZE);
+            add_hits(sum, hits, counts[r][half], p->values + block * rows->block_size);
             hits += counts[r][half];
             for (int c = 0; c < 3; c++)
                 p->out[chunk * ALB_CHUNK_ROWS + r][c] += 0.5 * weight * sum[c];

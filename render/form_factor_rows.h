@@ -1,18 +1,18 @@
 // Rows of hit indices, packed: what form factors by rays are kept as.
 //
 // Row p has first[p + 1] - first[p] hits, its even rays and its odd ones apart, each half ascending. Indices are cut in
-// blocks of 65,536 and stored as the 16 bits within their block. Rows go in chunks of ALB_CHUNK_ROWS; a chunk holds for
-// each block the hits of all its rows, so that a product can stay in one block's radiosity (1 MiB: a core's cache)
-// over all rows.
+// even blocks of at most 65,536 and stored as the 16 bits within their block. Rows go in chunks of ALB_CHUNK_ROWS; a
+// chunk holds for each block the hits of all its rows, so that a product can stay in one block's radiosity (1 MiB at
+// most: a core's cache) over all rows.
 #pragma once
 #include "base/error.h"
 #include <stddef.h>
 #include <stdint.h>
 
-enum { ALB_CHUNK_ROWS = 256, ALB_BLOCK_SIZE = 1 << 16 };
+enum { ALB_CHUNK_ROWS = 256, ALB_BLOCK_MAX = 1 << 16 };
 
 typedef struct alb_hit_rows {
-    size_t count, chunks, blocks;
+    size_t count, chunks, blocks, block_size;
     size_t *first;    // [count + 1]
     size_t *segments; // [chunk * blocks + block]: where in hits the block's part begins; one more at the end
     uint16_t *counts; // [((chunk * blocks + block) * ALB_CHUNK_ROWS + row in chunk) * 2 + half]

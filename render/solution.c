@@ -18,6 +18,7 @@ const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "ligh
 
 // A change of the direct light, |E - E'| / |E|, below which the last solution is worth a product as a start.
 static const double small_change = 0.3;
+static const double scatter_error = 0.005; // relative, of what even light sends out
 static const alb_solver default_solver = ALB_SOLVER_TWO_LEVEL;
 
 static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
@@ -61,7 +62,7 @@ static bool check_scattering(alb_solution *s, const alb_scene *scene, alb_error 
 
 static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
-    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, 0.005, error))
+    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, scatter_error, error))
         return false;
     s->bytes[ALB_STAGE_SCATTERING] = alb_scatter_bytes(&s->scatter);
     return check_scattering(s, scene, error);
@@ -159,8 +160,11 @@ static bool take_stock(alb_solution *s, const alb_scene *scene, alb_error *error
     double sky[3];
     sky_radiosity(sky, scene);
     s->bound = alb_radiosity_bound(&s->equations, &s->report, (const double(*)[3])s->radiosity);
-    return alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, sky, error) &&
-           take_irradiance(s, scene, error);
+    if (!alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, sky, error))
+        return false;
+    const double scattered_percent = s->scatter.body_count ? 100 * scatter_error : 0;
+    s->stated_error_percent = hypot(s->rays_error_percent, scattered_percent) + 100 * s->bound;
+    return take_irradiance(s, scene, error);
 }
 
 // Casts more rays where the first solution asks for them, and solves again from it. The time counts as that of the

@@ -260,6 +260,7 @@ static void usage_errors(void **state)
         {"render", ALB_USAGE, "missing"},
         {"render cli/scene.json", ALB_USAGE, "-o"},
         {"render cli/scene.json -o cli/kept/picture.exr -o twice.exr", ALB_USAGE, "twice"},
+        {"render cli/scene.json -o cli/kept/picture.exr --error 0", ALB_USAGE, "--error"},
         {"compare -o cli/kept", ALB_USAGE, "pairs"},
         {"compare cli/spot.exr -o cli/kept", ALB_USAGE, "pairs"},
         {"compare cli/spot.exr cli/plan.json -o cli/kept", ALB_USAGE, "a pair is"},
@@ -371,6 +372,7 @@ static void good_input_still_works(void **state)
     free(page);
     free(again);
     assert_int_equal(run("render cli/scene.json -o cli/picture.exr"), 0);
+    assert_int_equal(run("render cli/scene.json -o cli/picture.exr --error 5"), 0);
     assert_true(alb_file_exists("cli/picture.exr") && alb_file_exists("cli/picture.png"));
 }
 

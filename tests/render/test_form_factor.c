@@ -117,21 +117,33 @@ static void sky_and_backs_are_told_apart(void **state)
     world_free(&w);
 }
 
-static void threads_do_not_matter(void **state)
+// One thread or two, rows in memory or in a file: the same bytes.
+static void threads_and_files_do_not_matter(void **state)
 {
     (void)state;
+    enum { KINDS = 3, BYTE = 1 };
     const alb_box box = {.size_mm = {3, 2, 1}, .cells = {7, 6, 5}, .grading = 4, .inward = true};
     world w;
-    alb_form_factors f[2];
     world_of_box(&w, &box);
-    for (int k = 0; k < 2; k++) {
+    const size_t n = w.patches.count;
+    double(*out[KINDS])[3], (*light)[3] = calloc(n, sizeof *light);
+    random_radiosity(light, &w, 3, 1);
+    for (int k = 0; k < KINDS; k++) {
+        alb_form_factors f;
         alb_error error = {0};
-        omp_set_num_threads(k + 1);
-        check_ok(alb_form_factors_create(&f[k], &w.patches, &w.tracer, 64, 3, ALB_SAMPLING_LATTICE, &error), &error);
+        omp_set_num_threads(k ? 2 : 1);
+        check_ok(alb_form_factors_create_within(&f, &w.patches, &w.tracer, 64, 3, ALB_SAMPLING_LATTICE,
+                                                k == 2 ? BYTE : 0, &error),
+                 &error);
+        assert_true((f.rows.mapped_bytes > 0) == (k == 2));
+        out[k] = calloc(n, sizeof *out[k]);
+        alb_form_factors_apply(out[k], &f, (const double(*)[3])light);
+        assert_memory_equal(out[k], out[0], n * sizeof *out[k]);
+        alb_form_factors_free(&f);
     }
-    assert_memory_equal(f[0].rows.hits, f[1].rows.hits, w.patches.count * 64 * sizeof(uint16_t));
-    alb_form_factors_free(&f[0]);
-    alb_form_factors_free(&f[1]);
+    for (int k = 0; k < KINDS; k++)
+        free(out[k]);
+    free(light);
     world_free(&w);
 }
 
@@ -257,7 +269,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rooms_match_closed_forms),        cmocka_unit_test(closed_rows_sum_to_one),
-        cmocka_unit_test(sky_and_backs_are_told_apart),    cmocka_unit_test(threads_do_not_matter),
+        cmocka_unit_test(sky_and_backs_are_told_apart),    cmocka_unit_test(threads_and_files_do_not_matter),
         cmocka_unit_test(scale_and_place_do_not_matter),   cmocka_unit_test(order_of_faces_does_not_matter),
         cmocka_unit_test(reciprocity_holds_statistically),
     };

@@ -4,7 +4,7 @@
 #include "render/form_factor_rows.h"
 #include <omp.h>
 
-enum { ROWS = 700, INDICES = 3 * ALB_BLOCK_SIZE + 17, LONGEST = 3000 };
+enum { ROWS = 700, INDICES = 3 * ALB_BLOCK_MAX + 17, LONGEST = 3000 };
 
 typedef double rgb[3];
 

@@ -211,6 +211,20 @@ static void residual_is_what_it_says(void **state)
     fill_random(&d, 80, 0.95, 3);
     fill_light(light, d.n, 3);
     const alb_bounce bounce = bounce_of(&d);
+    // Jacobi with one product: x = b, r = K b, and out comes b + K b
+    alb_error none = {0};
+    alb_radiosity_report once;
+    check_ok(alb_solver_run(found, &once, ALB_SOLVER_JACOBI, &bounce, (const alb_rgb *)light, NULL, 0.999, &none), &none);
+    apply(again, &d, (const alb_rgb *)light);
+    double bounced[3] = {0}, lit[3] = {0};
+    for (size_t i = 0; i < d.n; i++)
+        for (int c = 0; c < 3; c++) {
+            check_relative(found[i][c], light[i][c] + again[i][c], 1e-14);
+            bounced[c] += d.areas[i] * pow(again[i][c], 2);
+            lit[c] += d.areas[i] * pow(light[i][c], 2);
+        }
+    check_relative(once.residual, sqrt(fmax(bounced[0] / lit[0], fmax(bounced[1] / lit[1], bounced[2] / lit[2]))),
+                   1e-12);
     for (int solver = 0; solver < ALB_SOLVERS; solver++) {
         alb_error error = {0};
         alb_radiosity_report report;
