@@ -124,6 +124,7 @@ bool alb_optical_paths_create(alb_optical_paths *paths, const alb_body *body, co
         paths->voxel_mm = options->voxel_mm > 0 ? options->voxel_mm : default_voxel_mm(body, patches);
         if (!alb_optical_solid_prepare(paths->solid, paths->voxel_mm, paths->reach_mm, error))
             goto failed;
+        paths->voxel_mm = paths->solid->turns.size_mm;
     }
     describe(paths, body, share, limit_mm);
     paths->bytes = bytes_of(paths);

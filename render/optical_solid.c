@@ -11,7 +11,7 @@
 // A section that is longer than this times its chord is compared with the graph's path; and how much longer than the
 // section that may be before it is pulled, for pulling to gain so much is rare.
 static const double trusted_detour = 1.2, worth_pulling = 1.15;
-enum { FINE_VOXELS = 6000000, TOUCHES = 16 };
+enum { VOXELS_MOST = 6000000, VOXELS_LEAST = 20000, VOXELS_A_PATCH = 100, TOUCHES = 16 };
 
 static bool fill_starts(alb_optical_solid *solid, alb_error *error)
 {
@@ -36,8 +36,9 @@ bool alb_optical_solid_create(alb_optical_solid *solid, const alb_body *body, co
     if (!alb_surface_net_create(&solid->net, body, patches, error))
         return false;
     solid->lift_mm = 1e-4 * solid->net.edge_mm;
+    const size_t most = VOXELS_LEAST + VOXELS_A_PATCH * body->count;
     if (alb_voxels_create(&solid->voxels, (const alb_vector(*)[3])solid->net.triangles, solid->net.count,
-                          0.8 * solid->net.edge_mm, FINE_VOXELS, body->closed, error) &&
+                          0.8 * solid->net.edge_mm, most < VOXELS_MOST ? most : VOXELS_MOST, body->closed, error) &&
         fill_starts(solid, error))
         return true;
     alb_optical_solid_free(solid);
@@ -46,8 +47,9 @@ bool alb_optical_solid_create(alb_optical_solid *solid, const alb_body *body, co
 
 bool alb_optical_solid_prepare(alb_optical_solid *solid, double voxel_mm, double reach_mm, alb_error *error)
 {
+    // Slivers have next to no area for their length: never finer than the voxels, whose number is bounded.
     solid->reach_mm = reach_mm;
-    return alb_turns_create(&solid->turns, solid, voxel_mm, error);
+    return alb_turns_create(&solid->turns, solid, fmax(voxel_mm, solid->voxels.size_mm), error);
 }
 
 void alb_optical_solid_free(alb_optical_solid *solid)

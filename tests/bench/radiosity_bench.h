@@ -21,8 +21,9 @@ typedef struct bench {
     size_t oracle_rows;
     figures of[TEST_SCENES];
     double frame_s;
-    size_t *rows;        // of the oracle, for the scene at hand
-    rgb *truth, *direct; // by rays; what else falls there
+    double narrow_made_s, narrow_s, narrow_mb, narrow_error_percent; // render/relight.h on the bowls
+    size_t *rows;                                                    // of the oracle, for the scene at hand
+    rgb *truth, *direct;                                             // by rays; what else falls there
     double sweep_seconds[3][SWEEP], sweep_bytes[3][SWEEP], sweep_error[3][SWEEP]; // lattice, hemicube, hemicube dropped
     recipe baseline;
     double baseline_error;

@@ -108,7 +108,7 @@ static void narrow_relighting_states_its_error(void **state)
     alb_error error = {0};
     alb_scene scene;
     alb_solution s;
-    alb_relight narrow[3] = {{0}};
+    alb_relight narrow[3] = {{0}}, none;
     room(&scene);
     check_ok(alb_solution_create(&s, &scene, &error), &error);
     alb_rgb *found = calloc(s.patches.count, sizeof *found);
@@ -140,9 +140,9 @@ static void narrow_relighting_states_its_error(void **state)
     alb_relight_apply(light, &narrow[2], (const alb_rgb *)s.irradiance);
     omp_set_num_threads(threads);
     assert_memory_equal(light, found, s.patches.count * sizeof *found);
-    check_fails(alb_relight_create(&narrow[0], &s.equations, &s.patches, 0, false, 7, &error), &error, ALB_BAD_DATA,
+    check_fails(alb_relight_create(&none, &s.equations, &s.patches, 0, false, 7, &error), &error, ALB_BAD_DATA,
                 "0 columns");
-    check_fails(alb_relight_create(&narrow[0], &s.equations, &s.patches, 513, false, 7, &error), &error, ALB_BAD_DATA,
+    check_fails(alb_relight_create(&none, &s.equations, &s.patches, 513, false, 7, &error), &error, ALB_BAD_DATA,
                 "at most");
     for (int k = 0; k < 3; k++)
         alb_relight_free(&narrow[k]);
