@@ -349,7 +349,7 @@ static void grant(const viewer *v)
     workspace *work = v->work;
     const size_t n = work->wish_count;
     work->detours = alb_grow(&work->found.failed, work->detours, &work->detour_capacity, 0, n, sizeof *work->detours);
-    if (work->found.failed)
+    if (work->found.failed || !n)
         return;
     memset(work->detours, 0, n * sizeof *work->detours);
     if (v->paths->kind != ALB_OPTICAL_CONVEX)

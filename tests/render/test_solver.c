@@ -214,7 +214,8 @@ static void residual_is_what_it_says(void **state)
     // Jacobi with one product: x = b, r = K b, and out comes b + K b
     alb_error none = {0};
     alb_radiosity_report once;
-    check_ok(alb_solver_run(found, &once, ALB_SOLVER_JACOBI, &bounce, (const alb_rgb *)light, NULL, 0.999, &none), &none);
+    check_ok(alb_solver_run(found, &once, ALB_SOLVER_JACOBI, &bounce, (const alb_rgb *)light, NULL, 0.999, &none),
+             &none);
     apply(again, &d, (const alb_rgb *)light);
     double bounced[3] = {0}, lit[3] = {0};
     for (size_t i = 0; i < d.n; i++)
