@@ -24,17 +24,12 @@ typedef struct alb_window {
     double sigma;   // from the true source to this one
 } window;
 
-typedef struct alb_window_key {
-    double distance;
-    uint32_t id; // a window, or WINDOWS + vertex
-} window_key;
-
 bool alb_geodesic_memory_create(alb_geodesic_memory *m, const alb_geodesic_surface *surface, alb_error *error)
 {
-    *m = (alb_geodesic_memory){0};
+    *m = (alb_geodesic_memory){.heap.capacity = 2 * WINDOWS}; // ids: a window, or WINDOWS + vertex
     if ((m->windows = alb_allocate(WINDOWS, sizeof *m->windows, error)) &&
         (m->free = alb_allocate(WINDOWS, sizeof *m->free, error)) &&
-        (m->heap = alb_allocate(2 * WINDOWS, sizeof *m->heap, error)) &&
+        (m->heap.entries = alb_allocate(2 * WINDOWS, sizeof *m->heap.entries, error)) &&
         (m->heads = alb_allocate(surface->count, sizeof *m->heads, error)) &&
         (m->stamps = alb_allocate(surface->count, sizeof *m->stamps, error)) &&
         (m->vertex_stamps = alb_allocate(surface->vertex_count, sizeof *m->vertex_stamps, error)) &&
@@ -48,44 +43,12 @@ void alb_geodesic_memory_free(alb_geodesic_memory *m)
 {
     free(m->windows);
     free(m->free);
-    free(m->heap);
+    free(m->heap.entries);
     free(m->heads);
     free(m->stamps);
     free(m->vertex_stamps);
     free(m->distances);
     *m = (alb_geodesic_memory){0};
-}
-
-static bool less(window_key a, window_key b)
-{
-    return a.distance < b.distance || (a.distance == b.distance && a.id < b.id);
-}
-
-static bool push(alb_geodesic_memory *m, double distance, uint32_t id)
-{
-    const window_key key = {distance, id};
-    if (m->heap_count == 2 * WINDOWS)
-        return false;
-    size_t at = m->heap_count++;
-    for (; at > 0 && less(key, m->heap[(at - 1) / 2]); at = (at - 1) / 2)
-        m->heap[at] = m->heap[(at - 1) / 2];
-    m->heap[at] = key;
-    return true;
-}
-
-static window_key pop(alb_geodesic_memory *m)
-{
-    const window_key top = m->heap[0], last = m->heap[--m->heap_count];
-    size_t at = 0;
-    for (size_t child; (child = 2 * at + 1) < m->heap_count; at = child) {
-        if (child + 1 < m->heap_count && less(m->heap[child + 1], m->heap[child]))
-            child++;
-        if (!less(m->heap[child], last))
-            break;
-        m->heap[at] = m->heap[child];
-    }
-    m->heap[at] = last;
-    return top;
 }
 
 static double distance_of(const alb_geodesic_memory *m, uint32_t vertex)
@@ -107,7 +70,7 @@ static void reach_vertex(geodesic *g, uint32_t vertex, double distance)
         return;
     m->vertex_stamps[vertex] = m->stamp;
     m->distances[vertex] = distance;
-    if (g->surface->turns[vertex] && distance <= g->reach_mm && !push(m, distance, WINDOWS + vertex))
+    if (g->surface->turns[vertex] && distance <= g->reach_mm && !alb_heap_push(&m->heap, distance, WINDOWS + vertex))
         m->dropped++;
 }
 
@@ -181,7 +144,7 @@ static void take(geodesic *g, offer *o)
                       .y = o->y,
                       .sigma = o->sigma};
     const uint32_t id = m->free_count > 0 ? m->free[m->free_count - 1] : m->used;
-    if (id == WINDOWS || !push(m, nearest, id)) {
+    if (id == WINDOWS || !alb_heap_push(&m->heap, nearest, id)) {
         m->dropped++;
         return;
     }
@@ -303,7 +266,7 @@ static void start(geodesic *g, size_t count, uint32_t triangle, alb_vector from)
         memset(m->vertex_stamps, 0, s->vertex_count * sizeof *m->vertex_stamps);
         m->stamp = 1;
     }
-    m->heap_count = 0;
+    m->heap.count = 0;
     m->free_count = 0, m->used = 0;
     for (uint32_t i = 0; i < count; i++) {
         alb_geodesic_target *t = &g->targets[i];
@@ -339,19 +302,19 @@ void alb_geodesic_run(alb_geodesic_target *targets, size_t count, size_t alterna
     geodesic g = {targets, memory, surface, reach_mm};
     double limit = (double)INFINITY;
     start(&g, count, triangle, from);
-    for (size_t step = 0; memory->heap_count > 0; step++) {
-        const window_key key = pop(memory);
+    for (size_t step = 0; memory->heap.count > 0; step++) {
+        const alb_heap_entry top = alb_heap_pop(&memory->heap);
         if (step % LOOK_AGAIN == 0)
             limit = fmin(reach_mm, furthest(targets, count, alternatives));
-        if (key.distance > limit)
+        if (top.key > limit)
             break;
-        if (key.id >= WINDOWS) {
-            if (key.distance <= distance_of(memory, key.id - WINDOWS))
-                turn(&g, key.id - WINDOWS);
+        if (top.id >= WINDOWS) {
+            if (top.key <= distance_of(memory, top.id - WINDOWS))
+                turn(&g, top.id - WINDOWS);
             continue;
         }
-        const window w = memory->windows[key.id];
-        memory->free[memory->free_count++] = key.id;
+        const window w = memory->windows[top.id];
+        memory->free[memory->free_count++] = top.id;
         const unfolded u = unfold(surface, w.place);
         const offer again = {.length = u.length,
                              .b0 = w.b0,

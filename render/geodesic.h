@@ -1,6 +1,7 @@
 // Exact shortest paths along a triangle surface, from a point to points, up to a reach.
 #pragma once
 #include "base/error.h"
+#include "base/heap.h"
 #include "base/vector.h"
 #include <stddef.h>
 #include <stdint.h>
@@ -33,11 +34,11 @@ typedef struct alb_geodesic_target {
 // Workspace of one thread.
 typedef struct alb_geodesic_memory {
     struct alb_window *windows;
-    struct alb_window_key *heap;
+    alb_heap heap;
     uint32_t *free, *heads, *stamps, *vertex_stamps, stamp, used;
     double *distances;
-    size_t free_count, heap_count, dropped; // dropped: windows there was no room for; answers stay lengths of
-                                            // paths, perhaps not the shortest
+    size_t free_count, dropped; // dropped: windows there was no room for; answers stay lengths of paths, perhaps not
+                                // the shortest
 } alb_geodesic_memory;
 bool alb_geodesic_memory_create(alb_geodesic_memory *memory, const alb_geodesic_surface *surface, alb_error *error);
 void alb_geodesic_memory_free(alb_geodesic_memory *memory);

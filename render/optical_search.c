@@ -11,19 +11,14 @@
 
 enum { OPEN = 1, SEEN = 2, CLOSED = 4, CANDIDATES = 160, TRIES = 12 };
 
-typedef struct alb_heap_entry {
-    float length;
-    uint32_t node;
-} heap_entry;
-
 bool alb_search_create(alb_search *search, size_t nodes, alb_error *error)
 {
-    *search = (alb_search){.source = UINT32_MAX, .heap_capacity = 16 * nodes + 4096};
+    *search = (alb_search){.source = UINT32_MAX, .heap.capacity = 16 * nodes + 4096};
     if ((search->parents = alb_allocate(nodes, sizeof *search->parents, error)) &&
         (search->stamps = alb_allocate(nodes, sizeof *search->stamps, error)) &&
         (search->lengths = alb_allocate(nodes, sizeof *search->lengths, error)) &&
         (search->states = alb_allocate(nodes, 1, error)) &&
-        (search->heap = alb_allocate(search->heap_capacity, sizeof *search->heap, error)))
+        (search->heap.entries = alb_allocate(search->heap.capacity, sizeof *search->heap.entries, error)))
         return true;
     alb_search_free(search);
     return false;
@@ -35,40 +30,8 @@ void alb_search_free(alb_search *search)
     free(search->stamps);
     free(search->lengths);
     free(search->states);
-    free(search->heap);
+    free(search->heap.entries);
     *search = (alb_search){0};
-}
-
-static bool less(heap_entry a, heap_entry b)
-{
-    return a.length < b.length || (a.length == b.length && a.node < b.node);
-}
-
-// A full heap drops the entry: the node stays as far as it was. It holds more than arise.
-static void push(alb_search *s, float length, uint32_t node)
-{
-    const heap_entry entry = {length, node};
-    if (s->heap_count == s->heap_capacity)
-        return;
-    size_t at = s->heap_count++;
-    for (; at > 0 && less(entry, s->heap[(at - 1) / 2]); at = (at - 1) / 2)
-        s->heap[at] = s->heap[(at - 1) / 2];
-    s->heap[at] = entry;
-}
-
-static heap_entry pop(alb_search *s)
-{
-    const heap_entry top = s->heap[0], last = s->heap[--s->heap_count];
-    size_t at = 0;
-    for (size_t child; (child = 2 * at + 1) < s->heap_count; at = child) {
-        if (child + 1 < s->heap_count && less(s->heap[child + 1], s->heap[child]))
-            child++;
-        if (!less(s->heap[child], last))
-            break;
-        s->heap[at] = s->heap[child];
-    }
-    s->heap[at] = last;
-    return top;
 }
 
 static float distance(const alb_turns *turns, uint32_t a, uint32_t b)
@@ -201,28 +164,28 @@ static void relax(alb_search *s, const alb_optical_solid *solid, uint32_t node)
             continue;
         s->stamps[n] = s->stamp, s->states[n] = OPEN;
         s->lengths[n] = length, s->parents[n] = parent;
-        push(s, length, n);
+        alb_heap_push(&s->heap, (double)length, n);
     }
 }
 
 void alb_search_run(alb_search *search, const alb_optical_solid *solid, uint32_t source)
 {
-    const float limit = (float)(solid->reach_mm + 2 * solid->turns.size_mm);
+    const double limit = solid->reach_mm + 2 * solid->turns.size_mm;
     search->source = source;
     if (++search->stamp == 0) {
         memset(search->stamps, 0, solid->turns.count * sizeof *search->stamps);
         search->stamp = 1;
     }
-    search->heap_count = 0;
+    search->heap.count = 0;
     search->stamps[source] = search->stamp, search->states[source] = OPEN | SEEN;
     search->lengths[source] = 0, search->parents[source] = source;
-    push(search, 0, source);
-    while (search->heap_count > 0) {
-        const heap_entry top = pop(search);
-        const uint32_t node = top.node;
-        if (search->states[node] & CLOSED || top.length > search->lengths[node])
+    alb_heap_push(&search->heap, 0, source);
+    while (search->heap.count > 0) {
+        const alb_heap_entry top = alb_heap_pop(&search->heap);
+        const uint32_t node = top.id;
+        if (search->states[node] & CLOSED || top.key > (double)search->lengths[node])
             continue;
-        if (top.length > limit)
+        if (top.key > limit)
             break;
         if (!(search->states[node] & SEEN)) {
             if (!sees(solid, search->parents[node], node)) {
@@ -231,8 +194,8 @@ void alb_search_run(alb_search *search, const alb_optical_solid *solid, uint32_t
                     continue;
                 }
                 search->states[node] |= SEEN;
-                if (search->heap_count > 0 && search->lengths[node] > search->heap[0].length) {
-                    push(search, search->lengths[node], node);
+                if (search->heap.count > 0 && (double)search->lengths[node] > search->heap.entries[0].key) {
+                    alb_heap_push(&search->heap, (double)search->lengths[node], node);
                     continue;
                 }
             }

@@ -1,5 +1,6 @@
 // Paths inside one body: what the parts that find them share. Points are relative to the body's middle.
 #pragma once
+#include "base/heap.h"
 #include "render/geodesic.h"
 #include "render/optical_path.h"
 #include "render/voxels.h"
@@ -55,8 +56,7 @@ typedef struct alb_search {
     uint32_t source, *parents, *stamps, stamp;
     float *lengths;
     unsigned char *states;
-    struct alb_heap_entry *heap;
-    size_t heap_count, heap_capacity;
+    alb_heap heap; // of nodes; one that is full drops an entry, and the node stays as far as it was
 } alb_search;
 bool alb_search_create(alb_search *search, size_t nodes, alb_error *error);
 void alb_search_free(alb_search *search);
