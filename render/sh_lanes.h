@@ -2,10 +2,12 @@
 // with and not written: every item meets the same operations wherever the batch begins or ends.
 #pragma once
 #include <stddef.h>
+#include <stdint.h>
 #include <string.h>
 
 enum { ALB_LANES = 8 };
 typedef float alb_lanes __attribute__((vector_size(ALB_LANES * sizeof(float))));
+typedef int32_t alb_lanes_bits __attribute__((vector_size(ALB_LANES * sizeof(int32_t))));
 
 // `values` coefficients of up to eight items that begin at `in`.
 static inline void alb_lanes_load(alb_lanes *lanes, const float *in, size_t stride, size_t items, int values)

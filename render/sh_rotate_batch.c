@@ -47,11 +47,25 @@ typedef struct angle {
     alb_lanes cosine, sine;
 } angle;
 
-static inline __attribute__((always_inline)) void turn_x(alb_lanes *out, const alb_lanes *in, int order,
-                                                         const quarter *q)
+// A quarter turn about x, to and fro by its sign: bands to l = 3 written out, those beyond from the table.
+static inline __attribute__((always_inline)) void turn_x(alb_lanes *out, const alb_lanes *in, int order, float sign)
 {
+    const float half = 0.5F, h3 = 0.866025404F, q1 = 0.25F, q6 = 0.612372436F, q10 = 0.790569415F, q15 = 0.968245837F;
     out[0] = in[0];
-    for (int i = 1; i < order * order; i++) {
+    if (order > 1)
+        out[1] = -sign * in[2], out[2] = sign * in[1], out[3] = in[3];
+    if (order > 2) {
+        out[4] = -sign * in[7], out[5] = -in[5], out[7] = sign * in[4];
+        out[6] = -half * in[6] - h3 * in[8], out[8] = half * in[8] - h3 * in[6];
+    }
+    if (order > 3) {
+        const alb_lanes a = sign * in[12], b = sign * in[14], c = sign * in[9], d = sign * in[11];
+        out[9] = q10 * a - q6 * b, out[11] = q6 * a + q10 * b;
+        out[12] = -q10 * c - q6 * d, out[14] = q6 * c - q10 * d;
+        out[10] = -in[10], out[13] = -q1 * in[13] - q15 * in[15], out[15] = q1 * in[15] - q15 * in[13];
+    }
+    const quarter *q = sign > 0 ? &forth : &back;
+    for (int i = 16; i < order * order; i++) {
         alb_lanes sum = q->value[q->begin[i]] * in[q->column[q->begin[i]]];
         for (int k = q->begin[i] + 1; k < q->begin[i + 1]; k++)
             sum += q->value[k] * in[q->column[k]];
@@ -78,18 +92,17 @@ static inline __attribute__((always_inline)) void turn_z(alb_lanes *c, int order
 static inline __attribute__((always_inline)) void make_angle(angle *a, alb_lanes *length, const alb_lanes *x,
                                                              const alb_lanes *y)
 {
-    float xs[ALB_LANES], ys[ALB_LANES], lengths[ALB_LANES];
-    memcpy(xs, x, sizeof xs);
-    memcpy(ys, y, sizeof ys);
-    for (int j = 0; j < ALB_LANES; j++) {
-        const float n = sqrtf(xs[j] * xs[j] + ys[j] * ys[j]);
-        xs[j] = n > 0 ? xs[j] / n : 1;
-        ys[j] = n > 0 ? ys[j] / n : 0;
-        lengths[j] = n;
-    }
-    memcpy(&a->cosine, xs, sizeof xs);
-    memcpy(&a->sine, ys, sizeof ys);
-    memcpy(length, lengths, sizeof lengths);
+    const alb_lanes square = *x * *x + *y * *y, one = (alb_lanes){0} + 1;
+    const alb_lanes where_zero = (alb_lanes)((square <= 0) & (alb_lanes_bits)one);
+    float root[ALB_LANES];
+    memcpy(root, &square, sizeof root);
+#pragma GCC unroll 1
+    for (int j = 0; j < ALB_LANES; j++)
+        root[j] = sqrtf(root[j]);
+    memcpy(length, root, sizeof root);
+    const alb_lanes inverse = 1 / (*length + where_zero);
+    a->cosine = *x * inverse + where_zero;
+    a->sine = *y * inverse;
 }
 
 // phi and theta of axes.
@@ -111,9 +124,9 @@ static inline __attribute__((always_inline)) void turn_axis(alb_lanes *c, int or
         phi.sine = -phi.sine, theta.sine = -theta.sine;
         turn_z(c, order, &phi);
     }
-    turn_x(other, c, order, &forth);
+    turn_x(other, c, order, 1);
     turn_z(other, order, &theta);
-    turn_x(c, other, order, &back);
+    turn_x(c, other, order, -1);
     if (to == FROM_AXIS)
         turn_z(c, order, &phi);
 }
@@ -134,9 +147,9 @@ static inline __attribute__((always_inline)) void turn_quaternion(alb_lanes *c, 
     last.cosine = sum.cosine * difference.cosine - sum.sine * difference.sine;
     last.sine = sum.sine * difference.cosine + sum.cosine * difference.sine;
     turn_z(c, order, &first);
-    turn_x(other, c, order, &forth);
+    turn_x(other, c, order, 1);
     turn_z(other, order, &middle);
-    turn_x(c, other, order, &back);
+    turn_x(c, other, order, -1);
     turn_z(c, order, &last);
 }
 
