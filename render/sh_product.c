@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Sums at the nodes of one ring: product *= f, and what the ring adds to the projection.
 static double value_at(const double *factors, int order, size_t count, alb_vector d)
 {
     double product = 1;

@@ -23,7 +23,8 @@ bool alb_sh_product(double *out, int out_order, const double *factors, int order
 // The product of two, cut to the order of both (the triple product of Snyder 2006), errors below 3e-6 of the product
 // of their norms. `out` may be a or b.
 //
-// Cutting after each of several factors loses what the next would have brought back into the bands kept, and more with
-// another order of multiplication: it is not associative. Where several are multiplied in turn, multiply from the
-// nearest to the farthest, in that order for every receiver; alb_sh_product says what is lost.
+// Cutting after each of several factors loses what the next would have brought back into the bands kept, and something
+// else in another order of multiplication: it is not associative (for eight caps of order 4 the orders differ by rms
+// 0.04). Where several are multiplied in turn, multiply from the nearest to the farthest, the same for every receiver.
+// Most of the error is that of the factors: order 6 throughout, cut at the end, brings 0.065 down to 0.018.
 void alb_sh_product_batch(float *out, const float *a, const float *b, int order, size_t stride, size_t count);
