@@ -5,7 +5,6 @@
 // Y is a polynomial in x, y, z: no angles, no poles. Without s^m the values near the poles grow like l^m: beyond order
 // 256 they leave the range of double.
 #include "render/sh.h"
-#include "base/vector_clones.h"
 #include "render/sh_lanes.h"
 
 // a_lm; zero where the recurrence begins.
@@ -120,27 +119,32 @@ static void make_steps(steps *s, int order)
     }
 }
 
-static inline __attribute__((always_inline)) void evaluate_block(alb_lanes *out, int order, const alb_lanes d[3],
-                                                                 const steps *s)
+ALB_LANES_INLINE void evaluate_block(alb_lanes *out, int order, alb_lanes d[3], const steps *s)
 {
-    alb_lanes re = {0}, im = {0};
+    alb_lanes re = {0}, im = {0}, old, last, before;
     for (int m = 0; m < order; m++) {
-        const alb_lanes old = re;
-        re = m ? re * d[0] - im * d[1] : re + 1;
-        im = m ? old * d[1] + im * d[0] : im;
-        alb_lanes last = {0}, before = {0};
+        memcpy(old, re, sizeof re);
+        ALB_EACH_LANE re[lane] = m ? re[lane] * d[0][lane] - im[lane] * d[1][lane] : 1;
+        ALB_EACH_LANE im[lane] = m ? old[lane] * d[1][lane] + im[lane] * d[0][lane] : 0;
+        ALB_EACH_LANE last[lane] = s->first[m];
+        memset(before, 0, sizeof before);
         for (int l = m; l < order; l++) {
-            const int k = l * (l + 1) / 2 + m;
-            const alb_lanes value = l > m ? s->a[k] * d[2] * last - s->b[k] * before : (alb_lanes){0} + s->first[m];
-            before = last, last = value;
-            out[alb_sh_index(l, m)] = value * re;
-            if (m)
-                out[alb_sh_index(l, -m)] = value * im;
+            if (l > m) {
+                const float a = s->a[l * (l + 1) / 2 + m], b = s->b[l * (l + 1) / 2 + m];
+                ALB_EACH_LANE
+                {
+                    const float value = a * d[2][lane] * last[lane] - b * before[lane];
+                    before[lane] = last[lane], last[lane] = value;
+                }
+            }
+            float *plus = out[alb_sh_index(l, m)], *minus = out[alb_sh_index(l, -m)];
+            ALB_EACH_LANE minus[lane] = last[lane] * im[lane];
+            ALB_EACH_LANE plus[lane] = last[lane] * re[lane];
         }
     }
 }
 
-ALB_VECTOR_CLONES
+ALB_LANES_CLONES
 void alb_sh_evaluate_batch(float *values, int order, const float *directions, size_t stride, size_t count)
 {
     steps s;
