@@ -3,7 +3,7 @@
 // phi, sin m phi, those of m1 >= m2 > 0 make
 //     cos (m1 + m2): cc - ss    sin (m1 + m2): sc + cs    cos (m1 - m2): cc + ss    sin (m1 - m2): sc - cs
 // where cc = a_c1 b_c2 + a_c2 b_c1 and so on, of both factors alike; each of the four goes to all l with one G for the
-// sine and the cosine. m2 = 0 leaves c and s, m1 = m2 = 0 one product. At order 4 this takes .. multiplications.
+// sine and the cosine. m2 = 0 leaves c and s, m1 = m2 = 0 one product.
 #include "base/quadrature.h"
 #include "render/sh_lanes.h"
 #include "render/sh_product.h"
