@@ -37,8 +37,8 @@ bool alb_sh_map_midrange(alb_sh_map *map, double k, alb_error *error)
 
 bool alb_sh_map_sphere(alb_sh_map *map, double k, alb_error *error)
 {
-    if (!(k > 0))
-        return alb_fail(error, ALB_USAGE, "sphere map: k = %g; a ratio of distances is above 0", k);
+    if (!(k >= 0))
+        return alb_fail(error, ALB_USAGE, "sphere map: k = %g; a ratio of distances is 0 or more", k);
     *map = (alb_sh_map){.kind = ALB_SH_MAP_SPHERE, .windowed = true, .k = fmin(fmax(k, k_minimum), k_maximum)};
     return true;
 }

@@ -13,17 +13,22 @@ static inline long double truth_binomial(int n, int k)
     return value;
 }
 
-// d^m/dx^m of P_l(x) = 2^-l sum_k (-1)^k C(l, k) C(2l - 2k, l) x^(l - 2k).
+enum { TRUTH_ORDER = 16 };
+
+// d^m/dx^m of P_l(x) = 2^-l sum_k (-1)^k C(l, k) C(2l - 2k, l) x^(l - 2k), l < TRUTH_ORDER; the terms are kept.
 static inline long double truth_legendre(int l, int m, long double x)
 {
-    long double sum = 0;
-    for (int k = 0; 2 * k <= l - m; k++) {
-        long double term = (k & 1 ? -1 : 1) * truth_binomial(l, k) * truth_binomial(2 * l - 2 * k, l);
+    static long double kept[TRUTH_ORDER][TRUTH_ORDER][TRUTH_ORDER];
+    long double *terms = kept[l][m], sum = 0;
+    const int last = (l - m) / 2;
+    for (int k = last; k >= 0 && terms[0] == 0; k--) { // the first last: it says that all are there
+        terms[k] = ldexpl((k & 1 ? -1 : 1) * truth_binomial(l, k) * truth_binomial(2 * l - 2 * k, l), -l);
         for (int i = 0; i < m; i++)
-            term *= l - 2 * k - i;
-        sum += term * powl(x, l - 2 * k - m);
+            terms[k] *= l - 2 * k - i;
     }
-    return ldexpl(sum, -l);
+    for (int k = 0; k <= last; k++)
+        sum = sum * x * x + terms[k];
+    return (l - m) & 1 ? sum * x : sum;
 }
 
 static inline long double truth_y(int l, int m, long double x, long double y, long double z)
