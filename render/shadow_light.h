@@ -2,7 +2,7 @@
 #pragma once
 #include "render/light.h"
 #include "render/shadow_field.h"
-#include "render/shadow_scaling.h"
+#include "render/shadow_laws.h"
 
 // An environment as spherical harmonics: radiance seen from the middle.
 typedef struct alb_shadow_sky {
@@ -12,7 +12,7 @@ typedef struct alb_shadow_sky {
     double radius_mm;     // 0: infinitely far away
 } alb_shadow_sky;
 // Of an environment light. Where it has a radius more bands are kept: nearer to the wall more of them are seen.
-void alb_shadow_sky_create(alb_shadow_sky *sky, const alb_light *environment);
+bool alb_shadow_sky_create(alb_shadow_sky *sky, const alb_light *environment, alb_error *error);
 
 enum { ALB_SHADOW_OCCLUDERS_MAX = 64 };
 
@@ -21,7 +21,7 @@ typedef struct alb_shadow_world {
     const alb_shadow_field *occluders, *lights;
     const alb_shadow_sky *skies;
     size_t occluder_count, light_count, sky_count; // at most ALB_SHADOW_OCCLUDERS_MAX occluders
-    const alb_shadow_scaling *scaling;
+    const alb_shadow_laws *laws;
 } alb_shadow_world;
 
 // irradiance[count][3] at points with unit normals: W/mm^2 where radiance is W/(mm^2 sr).

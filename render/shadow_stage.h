@@ -15,7 +15,7 @@ typedef struct alb_shadow_stage {
     size_t occluder_count, light_count;
     alb_shadow_sky *skies;
     size_t sky_count;
-    alb_shadow_scaling scaling;
+    alb_shadow_laws laws;
     alb_vector *normals;        // of the vertices: means over their faces by area
     float (*irradiance)[3];     // of the vertices
     double sampling_s, light_s; // of the latest frame
