@@ -17,6 +17,7 @@
 // Stops being true: order 4 blurs lights and gaps below 20 degrees; negative sums of that ringing become zero.
 #include "render/shadow_light.h"
 #include "base/memory.h"
+#include "base/progress.h"
 #include "render/sh_product.h"
 #include "render/sh_rotate.h"
 #include <omp.h>
@@ -35,6 +36,7 @@ typedef struct block {
     float shares[ALB_SHADOW_OCCLUDERS_MAX][BLOCK];        // of the occlusion that is above the horizon
     bool hides[ALB_SHADOW_OCCLUDERS_MAX];                 // any of the shares is not 0
     float (*occlusion)[VALUES * BLOCK];                   // of each occluder
+    alb_shadow_seconds seconds;
 } block;
 
 static void set_cosine(block *b)
@@ -308,16 +310,20 @@ static bool check(const alb_shadow_world *world, const alb_vector *points, size_
 static void light_block(float (*irradiance)[3], block *b, const alb_shadow_world *world)
 {
     memset(irradiance, 0, b->count * sizeof *irradiance);
+    const double start_s = alb_clock_s();
     set_cosine(b);
     find_occlusions(b, world);
+    const double found_s = alb_clock_s();
     for (size_t j = 0; j < world->light_count; j++)
         add_light(irradiance, b, world, &world->lights[j]);
     for (size_t j = 0; j < world->sky_count; j++)
         add_sky(irradiance, b, world, &world->skies[j]);
+    b->seconds.scaling += found_s - start_s;
+    b->seconds.products += alb_clock_s() - found_s;
 }
 
 bool alb_shadow_irradiance(float (*irradiance)[3], const alb_shadow_world *world, const alb_vector *points,
-                           const alb_vector *normals, size_t count, alb_error *error)
+                           const alb_vector *normals, size_t count, alb_shadow_seconds *seconds, alb_error *error)
 {
     const size_t threads = (size_t)omp_get_max_threads(), per_thread = world->occluder_count;
     if (!check(world, points, count, error))
@@ -335,6 +341,10 @@ bool alb_shadow_irradiance(float (*irradiance)[3], const alb_shadow_world *world
         memcpy(b->points, points + first, b->count * sizeof *points);
         memcpy(b->normals, normals + first, b->count * sizeof *normals);
         light_block(irradiance + first, b, world);
+    }
+    for (size_t t = 0; seconds && t < (ok ? threads : 0); t++) {
+        seconds->scaling += blocks[t].seconds.scaling;
+        seconds->products += blocks[t].seconds.products;
     }
     free(blocks);
     free(occlusion);

@@ -24,10 +24,15 @@ typedef struct alb_shadow_world {
     const alb_shadow_laws *laws;
 } alb_shadow_world;
 
-// irradiance[count][3] at points with unit normals: W/mm^2 where radiance is W/(mm^2 sr).
+// Seconds summed over threads: looking up and scaling of samples; products with all that follows.
+typedef struct alb_shadow_seconds {
+    double scaling, products;
+} alb_shadow_seconds;
+
+// irradiance[count][3] at points with unit normals: W/mm^2 where radiance is W/(mm^2 sr). seconds may be NULL.
 // ALB_BAD_DATA: too many occluders, or a receiver on or beyond the sphere of a sky.
 bool alb_shadow_irradiance(float (*irradiance)[3], const alb_shadow_world *world, const alb_vector *points,
-                           const alb_vector *normals, size_t count, alb_error *error);
+                           const alb_vector *normals, size_t count, alb_shadow_seconds *seconds, alb_error *error);
 
 // Of the receivers that face a light with a field, the share from which its bounding sphere is less than
 // ALB_SHADOW_SMALL_DEG in half-angle: order 4 then blurs its shadows (rms .14 of the irradiance).

@@ -192,8 +192,9 @@ bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb
     if (ok) {
         const alb_shadow_world world = alb_shadow_stage_world(stage);
         set_normals(stage->normals, mesh);
-        ok =
-            alb_shadow_irradiance(stage->irradiance, &world, mesh->vertices, stage->normals, mesh->vertex_count, error);
+        stage->seconds = (alb_shadow_seconds){0};
+        ok = alb_shadow_irradiance(stage->irradiance, &world, mesh->vertices, stage->normals, mesh->vertex_count,
+                                   &stage->seconds, error);
     }
     stage->sampling_s = sampled_s - start_s;
     stage->light_s = alb_clock_s() - sampled_s;

@@ -19,6 +19,7 @@ typedef struct alb_shadow_stage {
     alb_vector *normals;        // of the vertices: means over their faces by area
     float (*irradiance)[3];     // of the vertices
     double sampling_s, light_s; // of the latest frame
+    alb_shadow_seconds seconds; // of light_s, by threads
 } alb_shadow_stage;
 
 // Lights every vertex of the scene. A stage starts with all zero but settings and paper. Frames of a sequence keep

@@ -68,7 +68,7 @@ static double irradiance(const stage *s, alb_vector point, alb_vector normal)
     alb_error error = {0};
     float found[3];
     const alb_shadow_world world = world_of(s);
-    check_ok(alb_shadow_irradiance(&found, &world, &point, &normal, 1, &error), &error);
+    check_ok(alb_shadow_irradiance(&found, &world, &point, &normal, 1, NULL, &error), &error);
     return (double)found[0];
 }
 
@@ -122,7 +122,8 @@ static void white_furnace(void **state)
     const alb_shadow_world world = world_of(s);
     const alb_vector outside = {0, 0, 100}, up = {0, 0, 1};
     float found[3];
-    check_fails(alb_shadow_irradiance(&found, &world, &outside, &up, 1, &error), &error, ALB_BAD_DATA, "radius_mm");
+    check_fails(alb_shadow_irradiance(&found, &world, &outside, &up, 1, NULL, &error), &error, ALB_BAD_DATA,
+                "radius_mm");
     free_stage(s);
 }
 
@@ -219,7 +220,7 @@ static void receiver_crosses_the_bounding_sphere(void **state)
                 points[step] = alb_add((alb_vector){-5, 0, 0}, alb_times(3 * (3 - step * 1e-3), d));
                 normals[step] = normal;
             }
-            check_ok(alb_shadow_irradiance(found, &world, points, normals, STEPS, &error), &error);
+            check_ok(alb_shadow_irradiance(found, &world, points, normals, STEPS, NULL, &error), &error);
             for (int step = 1; step < STEPS; step++) // 0.001 radii a step; irradiance changes within 10 a radius
                 check_below(fabs((double)(found[step][0] - found[step - 1][0])), 0.001 * 10);
         }
@@ -291,9 +292,9 @@ static void agrees_with_rays(void **state)
     const alb_shadow_world world = world_of(s);
     const int threads = omp_get_max_threads();
     omp_set_num_threads(1);
-    check_ok(alb_shadow_irradiance(found, &world, points, normals, POINTS - 5, &error), &error);
+    check_ok(alb_shadow_irradiance(found, &world, points, normals, POINTS - 5, NULL, &error), &error);
     omp_set_num_threads(3);
-    check_ok(alb_shadow_irradiance(threaded, &world, points, normals, POINTS - 5, &error), &error);
+    check_ok(alb_shadow_irradiance(threaded, &world, points, normals, POINTS - 5, NULL, &error), &error);
     omp_set_num_threads(threads);
     assert_memory_equal(found, threaded, (POINTS - 5) * sizeof *found);
     double sum = 0, lost = 0;

@@ -184,8 +184,8 @@ static bool create_egg(alb_scene *scene, int frame, alb_error *error)
         close_object(scene, false), next_object(scene);
     const alb_vector hinge = {90 * cos(2 * M_PI * phase) - 40, -60, 260}, up = {0, 120, 0}; // fronts face down
     const alb_vector leaf[2] = {{90 * cos(fold), 0, -90 * sin(fold)}, {-90 * cos(fold), 0, -90 * sin(fold)}};
-    ok = ok && shape_sheet(&scene->mesh, hinge, up, leaf[0], 8, 6, 2, error) &&
-         shape_sheet(&scene->mesh, hinge, leaf[1], up, 6, 8, 3, error);
+    ok = ok && shape_sheet(&scene->mesh, hinge, up, leaf[0], 2, 2, 2, error) &&
+         shape_sheet(&scene->mesh, hinge, leaf[1], up, 2, 2, 3, error);
     return finish(ok, scene);
 }
 
