@@ -105,7 +105,7 @@ static bool write_picture(const outputs *out, const alb_image *picture, double b
 
 static void warn(const alb_scene *scene, const alb_solution *s)
 {
-    size_t open = 0, bent = 0;
+    size_t open = 0;
     if (scene->mesh.dropped)
         fprintf(stderr, "render: %zu faces left out: no area, or there twice\n", scene->mesh.dropped);
     if (scene->mesh.turned)
@@ -118,18 +118,12 @@ static void warn(const alb_scene *scene, const alb_solution *s)
                 "render: %.2f %% of the rays between patches meet the back of a patch, which is black; is a mesh open "
                 "or turned?\n",
                 100.0 * (double)s->factors.back_rays / (double)s->factors.rows.first[s->patches.count]);
-    for (size_t b = 0; b < s->scatter.body_count; b++) {
+    for (size_t b = 0; b < s->scatter.body_count; b++)
         open += !s->scatter.bodies[b].closed;
-        bent += s->scatter.bodies[b].closed && !s->scatter.bodies[b].convex && !s->scatter.bodies[b].detours;
-    }
     if (open)
         fprintf(stderr,
                 "render: %zu translucent bodies are not closed; light paths inside them are taken as straight\n", open);
-    if (bent)
-        fprintf(
-            stderr,
-            "render: %zu translucent bodies are not convex; straight paths through the hollows are too short there\n",
-            bent);
+    alb_scatter_note(stderr, "render: ", &s->scatter);
     if (s->column_sum > 1)
         fprintf(stderr, "render: the mesh is coarse for its scattering: a patch gives back %.4f of its flux\n",
                 s->column_sum);
