@@ -23,9 +23,9 @@
 // true: rough faces; beams that are not perpendicular; strongly forward phase functions in thin slabs, where M moments
 // are few (measured: docs/optical_properties.svg).
 #include "fit/adding_doubling.h"
+#include "base/quadrature.h"
 #include "base/vector_clones.h"
 #include "fit/fresnel.h"
-#include "fit/quadrature.h"
 #include <math.h>
 #include <string.h>
 

@@ -1,5 +1,6 @@
 // Error of irradiance by rays against rays, time and bytes: a 4 x 4 x 4 room of 72,752 patches with a ball in it, a
-// smooth radiosity and one of two bright spots (3.5 % of the room). Truth: 65,536 rays of other random numbers on 500
+// smooth radiosity and two of two bright spots (3.1 % of the room): a corner of the ceiling and a disc of the floor,
+// under the ball or away from all. Truth: 65,536 rays of other random numbers on 500
 // rows. Lattice rays beside random ones (the baseline), and rays refined for a stated error. Then view factors of
 // polygons against Howell's C-11 for gaps of 1e-3 to 1e3 of the size.
 //     bench.form_factor [CHART.svg]
@@ -12,12 +13,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETTINGS = 4, PATTERNS = 2, SAMPLED = 500, TRUTH_RAYS = 65536, PRODUCTS = 9, REFINED = 3 };
+enum { SETTINGS = 4, PATTERNS = 3, SAMPLED = 500, TRUTH_RAYS = 65536, PRODUCTS = 9, REFINED = 3 };
 
 static const int rays_of[SETTINGS] = {16, 64, 256, 1024};
 static const double asked_of[REFINED] = {10, 5, 2.5};
-static const char *const sampling_names[2] = {"lattice", "random"}, *const pattern_names[PATTERNS] = {"smooth",
-                                                                                                      "sharp"};
+static const char *const sampling_names[2] = {"lattice", "random"}, *const pattern_names[PATTERNS] = {
+                                                                        "smooth", "spot under the ball", "spot away"};
 
 typedef double rgb[3];
 
@@ -29,7 +30,7 @@ typedef struct bench {
     alb_mesh mesh;
     alb_patches patches;
     alb_tracer tracer;
-    rgb *radiosity, *irradiance; // channels 0 and 1 are the two patterns
+    rgb *radiosity, *irradiance; // a channel a pattern
     rgb truth[SAMPLED];          // of the patches sample_of
     row rows[2][SETTINGS], refined[REFINED];
 } bench;
@@ -54,7 +55,9 @@ static bool build(bench *b, alb_error *error)
     for (size_t p = 0; ok && p < n; p++) {
         const alb_vector c = b->patches.centroids[p];
         b->radiosity[p][0] = 0.5 + 0.5 * sin(2 * c.x) * cos(1.5 * c.y + c.z);
-        b->radiosity[p][1] = (c.z == 0 && hypot(c.x - 3, c.y - 1) < 0.85) || (c.z == 4 && c.x < 1 && c.y < 1);
+        const bool corner = c.z == 4 && c.x < 1 && c.y < 1;
+        b->radiosity[p][1] = corner || (c.z == 0 && hypot(c.x - 1.6, c.y - 2.3) < 0.85);
+        b->radiosity[p][2] = corner || (c.z == 0 && hypot(c.x - 3, c.y - 1) < 0.85);
     }
     return ok;
 }
@@ -106,8 +109,10 @@ static void measure(row *out, bench *b, const alb_form_factors *factors)
 
 static void print_row(const char *name, const row *r)
 {
-    printf("%-18s %6.0f  %s %6.2f  %s %6.2f %9.2f %11.2f %13.0f\n", name, r->rays, pattern_names[0],
-           r->error_percent[0], pattern_names[1], r->error_percent[1], r->seconds, r->product_ms, r->bytes);
+    printf("%-18s %6.0f", name, r->rays);
+    for (int c = 0; c < PATTERNS; c++)
+        printf("  %s %.2f", pattern_names[c], r->error_percent[c]);
+    printf(" %9.2f %11.2f %13.0f\n", r->seconds, r->product_ms, r->bytes);
 }
 
 static bool measure_even(bench *b, int sampling, int setting, alb_error *error)
@@ -158,11 +163,12 @@ static bool chart(const bench *b, const char *path, alb_error *error)
     static const char *const titles[3] = {"Form factors: error of irradiance against bytes a patch (72,752 patches)",
                                           "The same against seconds to cast", "The same against a product's time"},
                              *const axes[3] = {"bytes a patch", "seconds", "milliseconds"};
-    static const char *const labels[3][PATTERNS] = {{"lattice, smooth", "lattice, sharp"},
-                                                    {"random, smooth", "random, sharp"},
-                                                    {NULL, "for a stated error, sharp"}};
-    double x[3][5][SETTINGS], y[3][5][SETTINGS];
-    alb_curve curves[3][5];
+    static const char *const labels[3][PATTERNS] = {
+        {"lattice, smooth", "lattice, spot under the ball", "lattice, spot away"},
+        {"random, smooth", "random, spot under the ball", "random, spot away"},
+        {NULL, NULL, "for a stated error, spot away"}};
+    double x[3][7][SETTINGS], y[3][7][SETTINGS];
+    alb_curve curves[3][7];
     alb_panel panels[3];
     for (int panel = 0; panel < 3; panel++) {
         size_t count = 0;
@@ -217,7 +223,7 @@ int main(int argc, char **argv)
     if (!b)
         return ALB_NO_MEMORY;
     bool ok = build(b, &error) && find_truth(b, &error);
-    printf("%zu patches\n%-18s %6s  %-28s %9s %11s %13s\n", b->patches.count, "rays", "a patch", "rms error, %",
+    printf("%zu patches\n%-18s %6s  %-54s %9s %11s %13s\n", b->patches.count, "rays", "a patch", "rms error, %",
            "seconds", "product, ms", "bytes a patch");
     for (int sampling = 0; ok && sampling < 2; sampling++)
         for (int k = 0; ok && k < SETTINGS; k++)

@@ -19,7 +19,8 @@ static const struct {
 };
 
 static const char system_headers[] =
-    " assert.h ctype.h dirent.h errno.h fcntl.h float.h ftw.h inttypes.h limits.h locale.h math.h omp.h signal.h "
+    " assert.h ctype.h dirent.h errno.h fcntl.h float.h ftw.h inttypes.h limits.h locale.h math.h omp.h pthread.h "
+    "signal.h "
     "stdarg.h stdatomic.h stdbool.h stddef.h stdint.h stdio.h stdlib.h string.h strings.h sys/file.h sys/mman.h "
     "sys/stat.h sys/types.h time.h unistd.h xmmintrin.h pmmintrin.h ";
 

@@ -5,9 +5,9 @@
 //   p = L y e^(-+k z), m = +-k L^-T y e^(-+k z)  (Stamnes & Conklin 1984, in symmetric form).
 // Needs absorption > 0, n > 1, k d of no bound. Truncation at g^64: 1e-6 of the flux at g = 0.9.
 #pragma once
+#include "base/quadrature.h"
 #include "capture/photon.h"
 #include "fit/fresnel.h"
-#include "fit/quadrature.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

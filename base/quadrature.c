@@ -2,7 +2,7 @@
 // are the roots of P_(n-1) - P_n, weights (1 + x) / (n P_(n-1))^2, 2 / n^2 at x = 1 (Abramowitz & Stegun 25.4.29, .31).
 // The roots are bracketed on a grid in theta = acos x finer than they can lie together (they are about pi/n apart),
 // then halved: no start values that could miss one.
-#include "fit/quadrature.h"
+#include "base/quadrature.h"
 #include <math.h>
 #include <stdbool.h>
 

@@ -1,0 +1,201 @@
+// Blocks of eight receivers: each takes its two rows of the table and interpolates them, eight values at a time; eight
+// such vectors are turned over so that a vector holds one value of all eight; then the sparse product, eight wide.
+#include "render/sh_scale_batch.h"
+#include "base/memory.h"
+#include "base/vector_clones.h"
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LANES = 8, PADDED_MAX = 208 }; // order 8: 204
+typedef float eight __attribute__((vector_size(LANES * sizeof(float))));
+typedef int32_t eight_bits __attribute__((vector_size(LANES * sizeof(int32_t))));
+#define INLINE static inline __attribute__((always_inline))
+
+static bool falls(const alb_sh_law *law) { return law->kind == ALB_SH_LAW_LIGHT || law->kind == ALB_SH_LAW_OCCLUSION; }
+
+bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, alb_error *error)
+{
+    const int count = alb_sh_scaling_count(law->order_out, law->order_in);
+    *batch = (alb_sh_batch){.law = *law, .cells = cells, .padded = (count + LANES - 1) / LANES * LANES};
+    if (cells < 8 || cells > 4096 || cells % 2 || law->order_out > ALB_SH_ORDER_MAX || law->order_in > ALB_SH_ORDER_MAX)
+        return alb_fail(error, ALB_USAGE, "batch of %d cells, order %d to %d; expected 8 to 4096, even, order 1 to %d",
+                        cells, law->order_in, law->order_out, ALB_SH_ORDER_MAX);
+    batch->rows = alb_allocate((size_t)(cells + 1) * (size_t)batch->padded, sizeof *batch->rows, error);
+    bool ok = batch->rows != NULL;
+    for (int i = 0; i <= cells && ok; i++) {
+        const double u = 2. * i / cells - 1;
+        const double k = law->map == ALB_SH_MAP_MIDRANGE ? fmin(fmax(u, -1 + 1e-12), 1 - 1e-12)
+                                                         : fmin(fmax((1 + u) / (1 - u), 1e-5), 1e5);
+        alb_sh_scaling m;
+        ok = alb_sh_law_at(&m, law, k, error);
+        for (int v = 0; v < count && ok; v++)
+            batch->rows[(size_t)(i * batch->padded + v)] = (float)(m.value[v] * (falls(law) && k > 1 ? k * k : 1));
+    }
+    if (!ok)
+        alb_sh_batch_free(batch);
+    return ok;
+}
+
+void alb_sh_batch_free(alb_sh_batch *batch)
+{
+    free(batch->rows);
+    *batch = (alb_sh_batch){0};
+}
+
+// Eight vectors of eight values become eight vectors of eight receivers.
+INLINE void turn_over(eight *out, const eight *in)
+{
+    eight pair[8], four[8];
+    for (int i = 0; i < 4; i++) {
+        pair[2 * i] = __builtin_shufflevector(in[2 * i], in[2 * i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+        pair[2 * i + 1] = __builtin_shufflevector(in[2 * i], in[2 * i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++) {
+            four[4 * i + 2 * j] =
+                __builtin_shufflevector(pair[4 * i + j], pair[4 * i + 2 + j], 0, 1, 8, 9, 4, 5, 12, 13);
+            four[4 * i + 2 * j + 1] =
+                __builtin_shufflevector(pair[4 * i + j], pair[4 * i + 2 + j], 2, 3, 10, 11, 6, 7, 14, 15);
+        }
+    for (int i = 0; i < 4; i++) {
+        out[i] = __builtin_shufflevector(four[i], four[4 + i], 0, 1, 2, 3, 8, 9, 10, 11);
+        out[4 + i] = __builtin_shufflevector(four[i], four[4 + i], 4, 5, 6, 7, 12, 13, 14, 15);
+    }
+}
+
+// Where a block's receivers stand in the table, and the factor that its rows leave out.
+typedef struct places {
+    eight_bits cell;
+    eight share, factor; // NaN stays in `share`
+} places;
+
+// The smaller of two vectors, b where one is NaN.
+#define SMALLER(a, b) ((eight)((((a) < (b)) & (eight_bits)(a)) | (~((a) < (b)) & (eight_bits)(b))))
+
+INLINE void find_places(places *p, const alb_sh_batch *batch, const eight *ratio)
+{
+    const eight k = *ratio, zero = {0}, none = -zero, last = zero + (float)(batch->cells - 1);
+    const float half = 0.5f * (float)batch->cells;
+    eight at = half + half * k;
+    if (batch->law.map != ALB_SH_MAP_MIDRANGE) {
+        const eight back = -k;
+        at = 2 * half - 2 * half / (1 - SMALLER(zero, back)); // 2 - 2/(1 + k) = 1 + u
+    }
+    const eight below = SMALLER(at, last), back = -below, held = -SMALLER(back, none);
+    p->cell = __builtin_convertvector(held, eight_bits);
+    const eight over = at - __builtin_convertvector(p->cell, eight), under = -over;
+    const eight least = -SMALLER(zero, under), one = zero + 1;
+    p->share = SMALLER(one, least);
+    p->factor = one;
+    if (falls(&batch->law)) {
+        const eight away = -k, beyond = -one, most = SMALLER(beyond, away); // -max(1, k)
+        p->factor = 1 / (most * most);
+    }
+}
+
+INLINE void interpolate(eight *m, const alb_sh_batch *batch, const places *p, int padded)
+{
+    const float *rows[LANES];
+    for (int r = 0; r < LANES; r++)
+        rows[r] = batch->rows + (size_t)p->cell[r] * (size_t)padded;
+#pragma GCC unroll 4
+    for (int v = 0; v < padded; v += LANES) {
+        eight row[LANES];
+#pragma GCC unroll 8
+        for (int r = 0; r < LANES; r++) {
+            eight low, high;
+            memcpy(&low, rows[r] + v, sizeof low);
+            memcpy(&high, rows[r] + padded + v, sizeof high);
+            row[r] = low + p->share[r] * (high - low);
+        }
+        turn_over(m + v, row);
+    }
+}
+
+// One block: coefficient i of its receivers at in + i * stride.
+INLINE void multiply(float *out, size_t out_stride, const eight *value, const float *in, size_t in_stride,
+                     const eight *factor, int order_out, int order_in)
+{
+#pragma GCC unroll 8
+    for (int m = 0; m < order_out; m++)
+#pragma GCC unroll 8
+        for (int l = m; l < order_out; l++) {
+            eight plus = {0}, minus = {0};
+#pragma GCC unroll 8
+            for (int j = m; j < order_in; j++, value++) {
+                eight from;
+                memcpy(&from, in + (size_t)(j * (j + 1) + m) * in_stride, sizeof from);
+                plus += *value * from;
+                memcpy(&from, in + (size_t)(j * (j + 1) - m) * in_stride, sizeof from);
+                if (m)
+                    minus += *value * from;
+            }
+            plus *= *factor, minus *= *factor;
+            memcpy(out + (size_t)(l * (l + 1) + m) * out_stride, &plus, sizeof plus);
+            if (m)
+                memcpy(out + (size_t)(l * (l + 1) - m) * out_stride, &minus, sizeof minus);
+        }
+}
+
+INLINE void apply_block(float *out, const eight *m, const eight *factor, const float *in, size_t stride, size_t items,
+                        int order_out, int order_in)
+{
+    eight from[ALB_SH_COUNT_MAX], to[ALB_SH_COUNT_MAX];
+    if (items >= LANES) {
+        multiply(out, stride, m, in, stride, factor, order_out, order_in);
+        return;
+    }
+    memset(from, 0, sizeof from);
+    for (int i = 0; i < order_in * order_in; i++)
+        memcpy(&from[i], in + (size_t)i * stride, items * sizeof *in);
+    multiply((float *)to, LANES, m, (const float *)from, LANES, factor, order_out, order_in);
+    for (int i = 0; i < order_out * order_out; i++)
+        memcpy(out + (size_t)i * stride, &to[i], items * sizeof *out);
+}
+
+INLINE void apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride, size_t count,
+                  int order_out, int order_in, int padded)
+{
+    for (size_t r = 0; r < count; r += LANES) {
+        const size_t items = count - r < LANES ? count - r : LANES;
+        eight m[PADDED_MAX], ratio = {0};
+        places p;
+        memcpy(&ratio, k + r, items * sizeof *k);
+        find_places(&p, batch, &ratio);
+        interpolate(m, batch, &p, padded);
+        apply_block(out + r, m, &p.factor, in + r, stride, items, order_out, order_in);
+    }
+}
+
+// Orders 4 and 8 to 4 apart, so that their loops have fixed bounds.
+ALB_VECTOR_CLONES static void apply_four(float *out, const alb_sh_batch *batch, const float *k, const float *in,
+                                         size_t stride, size_t count)
+{
+    apply(out, batch, k, in, stride, count, 4, 4, 32);
+}
+
+ALB_VECTOR_CLONES static void apply_eight_to_four(float *out, const alb_sh_batch *batch, const float *k,
+                                                  const float *in, size_t stride, size_t count)
+{
+    apply(out, batch, k, in, stride, count, 4, 8, 72);
+}
+
+ALB_VECTOR_CLONES static void apply_any(float *out, const alb_sh_batch *batch, const float *k, const float *in,
+                                        size_t stride, size_t count)
+{
+    apply(out, batch, k, in, stride, count, batch->law.order_out, batch->law.order_in, batch->padded);
+}
+
+void alb_sh_batch_apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride,
+                        size_t count)
+{
+    const alb_sh_law *law = &batch->law;
+    if (law->order_out == 4 && law->order_in == 4)
+        apply_four(out, batch, k, in, stride, count);
+    else if (law->order_out == 4 && law->order_in == 8)
+        apply_eight_to_four(out, batch, k, in, stride, count);
+    else
+        apply_any(out, batch, k, in, stride, count);
+}
