@@ -5,8 +5,8 @@
 #include <string.h>
 
 static const alb_command *const commands[] = {
-    &alb_capture_command, &alb_calibrate_command, &alb_fit_command,
-    &alb_export_command,  &alb_render_command,    &alb_compare_command,
+    &alb_capture_command, &alb_calibrate_command, &alb_fit_command,      &alb_export_command,
+    &alb_render_command,  &alb_compare_command,   &alb_sh_table_command,
 };
 enum { COMMANDS = sizeof commands / sizeof commands[0] };
 

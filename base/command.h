@@ -28,4 +28,4 @@ bool alb_option_number(double *out, const char *name, const char *text, double m
                        alb_error *error);
 
 extern const alb_command alb_capture_command, alb_calibrate_command, alb_fit_command, alb_export_command,
-    alb_render_command, alb_compare_command;
+    alb_render_command, alb_compare_command, alb_sh_table_command;

@@ -45,6 +45,9 @@ double alb_profile_disc(const alb_profile *profile, double rho_mm);
 // Mean of S over the ring between two distances, 1/mm^2; outer > inner >= 0.
 double alb_profile_ring(const alb_profile *profile, double inner_mm, double outer_mm);
 
+// The largest decay of its terms, 1/mm.
+double alb_profile_fastest(const alb_profile *profile);
+
 // A profile with what is known of it.
 typedef struct alb_fitted {
     alb_profile profile;           // form NONE: not measured

@@ -23,8 +23,6 @@ double alb_profile_gradient(double gradient[ALB_PARAMETERS_MAX], const alb_profi
 double alb_profile_total_gradient(double gradient[ALB_PARAMETERS_MAX], const alb_profile *profile);
 // -d ln S / dr far out, 1/mm: the slowest term's.
 double alb_profile_slowest(const alb_profile *profile);
-// The largest decay of its terms, 1/mm.
-double alb_profile_fastest(const alb_profile *profile);
 // Whether S is finite (but at r = 0 where it is singular), nowhere negative and falls off, with its terms in order.
 bool alb_profile_sound(const alb_profile *profile);
 // Whether a parameter is 0: a term of no light, of which there is nothing to know.

@@ -3,9 +3,9 @@
 #include "base/exr.h"
 #include "base/memory.h"
 #include "base/progress.h"
+#include "render/shadow_command.h"
 #include "render/solution.h"
 #include "render/view.h"
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,31 +45,6 @@ static bool check_targets(const outputs *out, alb_error *error)
     return true;
 }
 
-static int by_size(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-// Exposure that shows the 99th percentile of the lit pixels' largest channel at 0.9, lamps and sky left out.
-static bool auto_exposure(double *exposure, const alb_image *picture, double brightest, alb_error *error)
-{
-    const size_t pixels = (size_t)picture->width * (size_t)picture->height;
-    float *values = alb_allocate(pixels, sizeof *values, error);
-    size_t count = 0;
-    if (!values)
-        return false;
-    for (size_t i = 0; i < pixels; i++) {
-        const float *p = picture->pixels + 3 * i, value = fmaxf(p[0], fmaxf(p[1], p[2]));
-        if (value > 0 && (double)value <= 1.001 * brightest)
-            values[count++] = value;
-    }
-    qsort(values, count, sizeof *values, by_size);
-    *exposure = count ? 0.9 / (double)values[(size_t)(0.99 * (double)(count - 1))] : 1;
-    free(values);
-    return true;
-}
-
 static bool write_mesh(const char *path, const alb_solution *solution, const alb_provenance *provenance,
                        alb_error *error)
 {
@@ -96,7 +71,7 @@ static bool write_picture(const outputs *out, const alb_image *picture, double b
     alb_json_begin(&json, provenance);
     alb_json_end_object(&json);
     const bool ok = (!json.text.failed || alb_fail(error, ALB_NO_MEMORY, "out of memory for the provenance")) &&
-                    png_path(png, out, error) && auto_exposure(exposure, picture, brightest, error) &&
+                    png_path(png, out, error) && alb_view_exposure(exposure, picture, brightest, error) &&
                     alb_exr_write(picture, json.text.bytes, out->picture, error) &&
                     alb_image_write_png(picture, *exposure, png, error);
     alb_json_free(&json);
@@ -105,7 +80,7 @@ static bool write_picture(const outputs *out, const alb_image *picture, double b
 
 static void warn(const alb_scene *scene, const alb_solution *s)
 {
-    size_t open = 0, bent = 0;
+    size_t open = 0;
     if (scene->mesh.dropped)
         fprintf(stderr, "render: %zu faces left out: no area, or there twice\n", scene->mesh.dropped);
     if (scene->mesh.turned)
@@ -118,18 +93,12 @@ static void warn(const alb_scene *scene, const alb_solution *s)
                 "render: %.2f %% of the rays between patches meet the back of a patch, which is black; is a mesh open "
                 "or turned?\n",
                 100.0 * (double)s->factors.back_rays / (double)s->factors.rows.first[s->patches.count]);
-    for (size_t b = 0; b < s->scatter.body_count; b++) {
+    for (size_t b = 0; b < s->scatter.body_count; b++)
         open += !s->scatter.bodies[b].closed;
-        bent += s->scatter.bodies[b].closed && !s->scatter.bodies[b].convex && !s->scatter.bodies[b].detours;
-    }
     if (open)
         fprintf(stderr,
                 "render: %zu translucent bodies are not closed; light paths inside them are taken as straight\n", open);
-    if (bent)
-        fprintf(
-            stderr,
-            "render: %zu translucent bodies are not convex; straight paths through the hollows are too short there\n",
-            bent);
+    alb_scatter_note(stderr, "render: ", &s->scatter);
     if (s->column_sum > 1)
         fprintf(stderr, "render: the mesh is coarse for its scattering: a patch gives back %.4f of its flux\n",
                 s->column_sum);
@@ -217,19 +186,25 @@ done:
 static bool run(int argc, char **argv, alb_error *error)
 {
     outputs out = {0};
-    const char *stated = NULL;
+    const char *stated = NULL, *method = NULL;
     const alb_option options[] = {
         {.label = "SCENE.json", .required = true, .value = &out.scene},
         {.name = "-o", .required = true, .value = &out.picture},
         {.name = "--mesh", .value = &out.mesh},
         {.name = "--png", .value = &out.png},
         {.name = "--error", .value = &stated},
+        {.name = "--method", .value = &method},
         {.name = "--json", .flag = &out.json},
     };
     alb_scene scene = {0};
     alb_provenance provenance = {.command = "render"};
-    if (!alb_options_read(options, sizeof options / sizeof *options, argc, argv, error) ||
-        !check_targets(&out, error) || !alb_scene_read(&scene, &provenance, out.scene, error))
+    if (!alb_options_read(options, sizeof options / sizeof *options, argc, argv, error))
+        return false;
+    if (method && !strcmp(method, "shadow"))
+        return alb_shadow_render(out.scene, out.picture, out.png, out.mesh, stated, out.json, error);
+    if (method && strcmp(method, "radiosity") != 0)
+        return alb_fail(error, ALB_USAGE, "--method %s: there are radiosity and shadow", method);
+    if (!check_targets(&out, error) || !alb_scene_read(&scene, &provenance, out.scene, error))
         return false;
     const bool given = !stated || alb_option_number(&scene.error_percent, "--error", stated, 0.01, 100, error);
     snprintf(provenance.options, sizeof provenance.options,
@@ -244,7 +219,8 @@ const alb_command alb_render_command = {
     .name = "render",
     .summary = "render a scene of translucent and opaque meshes",
     .usage =
-        "alabaster render SCENE.json -o PICTURE.exr [--png PICTURE.png] [--mesh OUT.ply] [--error PERCENT] [--json]\n"
+        "alabaster render SCENE.json -o PICTURE.exr [--png PICTURE.png] [--mesh OUT.ply] [--error PERCENT]\n"
+        "                 [--method radiosity|shadow] [--json]\n"
         "\n"
         "Solves B = (I - S F)^-1 (S E + M) on the scene's meshes and writes linear radiance as EXR and, beside it,\n"
         "a PNG whose exposure shows the brightest hundredth of what is lit at 0.9.\n"
@@ -254,6 +230,10 @@ const alb_command alb_render_command = {
         "  --error PERCENT    rays until the irradiance by rays errs by no more than this, rms; for error_percent\n"
         "  --json             patches, rays, links, products, residual, stated error, row sums, balance of flux,\n"
         "                     and the seconds and bytes of each stage\n"
+        "  --method shadow    soft shadows of moving objects by shadow fields instead, diffuse, without bounces: "
+        "every\n"
+        "                     frame of the scene; a run of # in the names of pictures becomes the frame's number;\n"
+        "                     --error: the cheapest setting whose stated error is no more\n"
         "The scene file is described in render/scene.h.\n",
     .run = run,
 };

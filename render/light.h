@@ -25,6 +25,7 @@ typedef struct alb_light {
     double blur_sd_mm;  // projector: Gaussian, each axis
     double radiance[3]; // environment: even, or where map.pixels is there
     alb_image map;      // environment: latitude-longitude, +y up, the middle of the picture is the direction -z
+    double radius_mm;   // environment: of the sphere about position_mm on which it lies; 0: infinitely far away
 } alb_light;
 
 void alb_light_free(alb_light *light);

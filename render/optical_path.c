@@ -88,7 +88,7 @@ static size_t bytes_of(const alb_optical_paths *paths)
     size_t bytes =
         net->count * (5 * sizeof(alb_vector) + 4 * sizeof(uint32_t)) + alb_voxels_bytes(&paths->solid->voxels);
     if (paths->sheet)
-        bytes += net->count * (sizeof(uint32_t) + sizeof(alb_vector) + sizeof(double)) +
+        bytes += net->count * (2 * sizeof(uint32_t) + 1 + sizeof(alb_vector) + sizeof(double)) +
                  alb_geodesic_surface_bytes(&paths->sheet->surface);
     return bytes + paths->solid->turns.count * 20 + net->count * (sizeof(uint32_t) + sizeof(alb_vector));
 }
@@ -143,6 +143,14 @@ void alb_optical_paths_free(alb_optical_paths *paths)
     free(paths->solid);
     free(paths->sheet);
     *paths = (alb_optical_paths){0};
+}
+
+alb_sheet_face alb_optical_paths_face(const alb_optical_paths *paths, uint32_t patch)
+{
+    if (paths->kind != ALB_OPTICAL_SHEET)
+        return ALB_RIM;
+    const alb_surface_net *net = &paths->solid->net;
+    return (alb_sheet_face)paths->sheet->sides[net->local[patch - net->first]];
 }
 
 bool alb_optical_workspace_create(alb_optical_workspace *work, const alb_optical_paths *paths, alb_error *error)

@@ -40,6 +40,10 @@ typedef struct alb_optical_target {
     float x_mm, y_mm, z_mm;
 } alb_optical_target;
 
+// Which face of a sheet the patch belongs to; light crosses between the two. ALB_RIM of what is no sheet.
+typedef enum alb_sheet_face { ALB_RIM, ALB_FRONT, ALB_BACK } alb_sheet_face;
+alb_sheet_face alb_optical_paths_face(const alb_optical_paths *paths, uint32_t patch);
+
 // Workspace of one thread. It keeps the last search: ask for exit patches in spatial order.
 typedef struct alb_optical_workspace {
     struct alb_optical_memory *memory;

@@ -85,6 +85,7 @@ void alb_optical_sheet_free(alb_optical_sheet *sheet)
 {
     free(sheet->facing);
     free(sheet->face);
+    free(sheet->sides);
     free(sheet->feet);
     free(sheet->thickness);
     alb_geodesic_surface_free(&sheet->surface);
@@ -134,12 +135,50 @@ static bool find_faces(alb_optical_sheet *sheet, const alb_surface_net *net, alb
     return true;
 }
 
+// The face that stands for those whose sides are known relative to it, and whether this one is turned against that.
+static uint32_t root_of(uint32_t *parents, uint8_t *turned, uint32_t face, uint8_t *against)
+{
+    for (*against = 0; parents[face] != face; face = parents[face]) {
+        const uint32_t parent = parents[face];
+        turned[face] ^= turned[parent]; // halves the path; the root is not turned
+        parents[face] = parents[parent];
+        *against ^= turned[face];
+    }
+    return face;
+}
+
+// Faces that lie opposite are front and back; where that is at odds with itself the first word counts.
+static bool find_sides(alb_optical_sheet *sheet, const alb_surface_net *net, alb_error *error)
+{
+    const size_t n = net->count;
+    uint32_t *parents = alb_allocate(n + 1, sizeof *parents, error);
+    uint8_t *turned = alb_allocate(n + 1, sizeof *turned, error), here, there;
+    const bool ok = parents && turned && (sheet->sides = alb_allocate(n, sizeof *sheet->sides, error));
+    for (uint32_t i = 0; ok && i <= n; i++)
+        parents[i] = i;
+    for (size_t i = 0; ok && i < n; i++) {
+        const uint32_t face = sheet->face[i], other = face ? sheet->face[sheet->facing[i]] : 0;
+        if (!other)
+            continue;
+        const uint32_t a = root_of(parents, turned, face, &here), b = root_of(parents, turned, other, &there);
+        if (a != b)
+            parents[a > b ? a : b] = a > b ? b : a, turned[a > b ? a : b] = here ^ there ^ 1;
+    }
+    for (size_t i = 0; ok && i < n; i++) {
+        root_of(parents, turned, sheet->face[i], &here);
+        sheet->sides[i] = (uint8_t)(!sheet->face[i] ? ALB_RIM : here ? ALB_BACK : ALB_FRONT);
+    }
+    free(parents);
+    free(turned);
+    return ok;
+}
+
 bool alb_optical_sheet_prepare(alb_optical_sheet *sheet, const alb_surface_net *net, double limit_mm, alb_error *error)
 {
     for (size_t i = 0; i < net->count; i++)
         if (sheet->thickness[i] > limit_mm)
             sheet->facing[i] = UINT32_MAX;
-    if (!find_faces(sheet, net, error))
+    if (!find_faces(sheet, net, error) || !find_sides(sheet, net, error))
         return false;
     return alb_geodesic_surface_create(&sheet->surface, (const alb_vector(*)[3])net->triangles,
                                        (const uint32_t(*)[3])net->neighbours, net->count, error);

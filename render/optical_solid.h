@@ -93,6 +93,7 @@ double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *so
 typedef struct alb_optical_sheet {
     uint32_t *facing;  // of each triangle: that which faces it across the sheet; UINT32_MAX: none
     uint32_t *face;    // of each triangle: which face it belongs to, 1 and up; 0: the rim
+    uint8_t *sides;    // of each triangle: alb_sheet_face
     alb_vector *feet;  // where the normal inwards meets that
     double *thickness; // how far off; INFINITY: none
     double median_mm;  // by area

@@ -8,10 +8,12 @@
 //     far                 clusters of patches (scatter_forest.c), to second order in their extent; none is left out,
 //                         so that a profile may become wider than that for which the links were made
 // Distances are straight lines where these stay inside the body, which is exact, and the length of the shortest path
-// inside elsewhere (optical_path.h). Straight however in bodies that are not closed, and in slabs: too short across
-// their hollows (the caller warns).
+// inside elsewhere (optical_path.h). Straight however in bodies that are not closed (the caller warns).
 // Between the faces of a slab the transmission profile acts at the lateral distance; on one face the reflection
-// profile; from and to the edge faces the reflection profile at the straight distance, for want of a measurement there.
+// profile; from and to the edge faces the reflection profile, for want of a measurement there. Where the body is not
+// convex and thin everywhere it is a sheet: distances are geodesics along its faces. Where it is not thin, a slab's
+// material is that of a solid: the reflection profile, along paths inside. So is a material that is no slab, however
+// thin the body: light crosses it by the reflection profile, and the sums of both faces count twice.
 // Stops being true where the profile's plane geometry does: within a diffusion length of edges, and for solids thinner
 // than that, whose row sums then show it by exceeding the profile's total.
 #include "render/scatter.h"
@@ -25,6 +27,10 @@
 // Links of one row on a plane. With 66 of them e^(-b r) misses 0.05 % of even light and 2 % rms of one point's, less on
 // meshes that resolve it with less than a few hundred patches.
 static double links_for(double error_wanted) { return fmin(fmax(0.33 / error_wanted, 20), 3000); }
+
+// How much light comes from beyond where paths are measured: all that is there counts as just there, or where it is if
+// that is further. A sheet that is rolled up has much there that lies near.
+static const double far_light = 0.01, far_light_in_sheets = 0.01;
 
 struct alb_scatter_parts {
     alb_forest forest;
@@ -97,35 +103,52 @@ static void free_paths(alb_scatter_parts *p)
     alb_bodies_free(&p->found);
 }
 
-// How far detours are measured: where a hundredth of the widest profile's light is further off.
-static double reach_of(const alb_profile profiles[3])
+// Where only so much of the widest profile's light is further off.
+static double reach_of(const alb_profile profiles[3], double left)
 {
     double reach = 0;
     for (int c = 0; c < 3; c++) {
         const double total = alb_profile_total(&profiles[c]);
         double r = 1e-6;
-        while (total > 0 && 2 * M_PI * alb_profile_disc(&profiles[c], r) < 0.99 * total && r < 1e6)
+        while (total > 0 && 2 * M_PI * alb_profile_disc(&profiles[c], r) < (1 - left) * total && r < 1e6)
             r *= 1.1;
         reach = fmax(reach, r);
     }
     return reach;
 }
 
-// Of solids that are not convex; the others go straight.
+// The transport mean free path, as far as a profile tells: that of its fastest decay. A slab is a sheet where it is
+// thin for that, or not much thicker than what was measured.
+static double mean_free_path_of(const alb_surface *surface)
+{
+    double longest = 0.15 * surface->thickness_mm;
+    for (int c = 0; c < 3; c++)
+        if (alb_profile_total(&surface->profiles[ALB_REFLECTION][c]) > 0)
+            longest = fmax(longest, 1 / alb_profile_fastest(&surface->profiles[ALB_REFLECTION][c]));
+    return longest;
+}
+
+// Of bodies that are not convex; the others go straight.
 static bool make_paths(alb_scatter *scatter, const alb_patches *patches, const alb_surface *surfaces, alb_error *error)
 {
     alb_scatter_parts *p = scatter->parts;
     if (!(p->paths = alb_allocate(p->found.count, sizeof *p->paths, error)))
         return false;
     for (size_t b = 0; b < p->found.count; b++) {
-        const alb_scatter_kernel *kernel = &p->kernels[p->of_bodies[b].index[ALB_REFLECTION]];
-        const alb_optical_options options = {.reach_mm = reach_of(surfaces[kernel->surface].profiles[ALB_REFLECTION])};
-        const bool slab = p->kernels[p->of_bodies[b].index[ALB_TRANSMISSION]].side == ALB_TRANSMISSION;
-        if (slab || !p->found.bodies[b].closed || p->found.bodies[b].convex)
+        const alb_body *body = &p->found.bodies[b];
+        const alb_surface *surface = &surfaces[p->materials[body->patches[0]]];
+        alb_optical_options options = {.reach_mm = reach_of(surface->profiles[ALB_REFLECTION], far_light)};
+        if (surface->slab) {
+            options.reach_mm = fmax(reach_of(surface->profiles[ALB_REFLECTION], far_light_in_sheets),
+                                    reach_of(surface->profiles[ALB_TRANSMISSION], far_light_in_sheets));
+            options.mean_free_path_mm = mean_free_path_of(surface);
+        }
+        if (!body->closed || body->convex)
             continue;
-        if (!alb_optical_paths_create(&p->paths[b], &p->found.bodies[b], patches, &options, error))
+        if (!alb_optical_paths_create(&p->paths[b], body, patches, &options, error))
             return false;
-        scatter->bodies[b].detours = p->paths[b].kind != ALB_OPTICAL_CONVEX;
+        scatter->bodies[b].paths = p->paths[b].kind;
+        scatter->bodies[b].thickness_mm = p->paths[b].thickness_mm;
     }
     return true;
 }
@@ -141,8 +164,7 @@ static bool make_links(alb_scatter *scatter, const alb_patches *patches, const a
         alb_scatter_kernel_needs_find(&needs[k], &p->kernels[k],
                                       surfaces[p->kernels[k].surface].profiles[p->kernels[k].side],
                                       links_for(error_wanted));
-    bool ok = make_paths(scatter, patches, surfaces, error) &&
-              alb_links_create(&p->links, &p->forest, patches, p->of_bodies, p->kernels, needs, p->paths, error_wanted,
+    bool ok = alb_links_create(&p->links, &p->forest, patches, p->of_bodies, p->kernels, needs, p->paths, error_wanted,
                                error);
     free_paths(p);
     free(needs);
@@ -187,12 +209,14 @@ static bool find_bodies(alb_scatter *scatter, const alb_patches *patches, const 
     int *labels = alb_allocate(n, sizeof *labels, error);
     for (size_t i = 0; labels && i < n; i++)
         labels[i] = surfaces[materials[i]].scatters ? materials[i] : -1;
-    const bool ok = labels && alb_bodies_find(found, patches, labels, error) &&
-                    (scatter->bodies = alb_allocate(found->count, sizeof *scatter->bodies, error)) &&
-                    alb_forest_create(&scatter->parts->forest, found, patches, materials, surfaces, error);
+    bool ok = labels && alb_bodies_find(found, patches, labels, error) &&
+              (scatter->bodies = alb_allocate(found->count, sizeof *scatter->bodies, error));
     for (size_t b = 0; ok && b < found->count; b++)
-        scatter->bodies[scatter->body_count++] = (alb_scatter_body){found->bodies[b].count, found->bodies[b].closed,
-                                                                    found->bodies[b].convex, .detours = false};
+        scatter->bodies[scatter->body_count++] = (alb_scatter_body){.patch_count = found->bodies[b].count,
+                                                                    .closed = found->bodies[b].closed,
+                                                                    .convex = found->bodies[b].convex};
+    ok = ok && make_paths(scatter, patches, surfaces, error) &&
+         alb_forest_create(&scatter->parts->forest, found, patches, materials, surfaces, scatter->parts->paths, error);
     free(labels);
     return ok;
 }
@@ -318,6 +342,26 @@ void alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, cons
     memset(out, 0, scatter->patch_count * sizeof *out);
     alb_forest_gather(&p->forest, irradiance);
     alb_product_add(out, &p->links, &p->forest, p->kernels, 1U << ALB_TRANSMISSION);
+}
+
+void alb_scatter_note(FILE *out, const char *prefix, const alb_scatter *scatter)
+{
+    static const char *const ways[ALB_OPTICAL_KINDS] = {"", "solids: paths inside, reflection alone",
+                                                        "sheets: paths along the faces, transmission between them"};
+    for (int kind = ALB_OPTICAL_SOLID; kind < ALB_OPTICAL_KINDS; kind++) {
+        size_t count = 0;
+        double thinnest = INFINITY, thickest = 0;
+        for (const alb_scatter_body *body = scatter->bodies; body < scatter->bodies + scatter->body_count; body++)
+            if ((int)body->paths == kind) {
+                count++;
+                thinnest = fmin(thinnest, body->thickness_mm), thickest = fmax(thickest, body->thickness_mm);
+            }
+        if (count && thickest > 0)
+            fprintf(out, "%s%zu bodies of a slab's material, %.3g to %.3g mm thick, are %s\n", prefix, count, thinnest,
+                    thickest, ways[kind]);
+        else if (count)
+            fprintf(out, "%s%zu translucent bodies are %s\n", prefix, count, ways[kind]);
+    }
 }
 
 size_t alb_scatter_bytes(const alb_scatter *scatter)

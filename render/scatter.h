@@ -1,13 +1,15 @@
 // Scattering S': what leaves patch j per irradiance on patch i, in density form, without the matrix.
 #pragma once
 #include "fit/material.h"
-#include "render/patch.h"
+#include "render/optical_path.h"
+#include <stdio.h>
 
 // What a patch is made of.
 typedef struct alb_surface {
     char name[ALB_GROUP_NAME];
     bool scatters;         // else opaque and diffuse
     bool slab;             // scatters as a slab: reflection on one face, transmission between the two; else as a solid
+    double thickness_mm;   // of the slab that was measured; 0: not known
     double reflectance[3]; // opaque
     alb_exit exits[ALB_SIDES];          // which way light leaves, reflected and through a slab; zero: as Lambert says
     double exitance[3];                 // emitted, per area
@@ -18,7 +20,8 @@ typedef struct alb_surface {
 typedef struct alb_scatter_body {
     size_t patch_count;
     bool closed, convex;
-    bool detours; // not convex, and distances are paths inside
+    alb_optical_kind paths; // ALB_OPTICAL_CONVEX, straight, also where the body is not closed
+    double thickness_mm;    // of slabs that are not convex, the median
 } alb_scatter_body;
 
 typedef struct alb_scatter_parts alb_scatter_parts;
@@ -48,4 +51,7 @@ bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_
 void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
 // The part of S' irradiance that crossed a slab or a sheet: zero elsewhere. Same rows.
 void alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
+// One line for each way that light goes inside bodies that are not convex: how many are solids, how many sheets, how
+// thick.
+void alb_scatter_note(FILE *out, const char *prefix, const alb_scatter *scatter);
 size_t alb_scatter_bytes(const alb_scatter *scatter);

@@ -6,7 +6,8 @@
 // from distance r, along the line of sight and across it,
 //     mean s = s(r) + v_along s'' / 2 + v_across s' / (2 r)
 // Light that is uneven over the cluster adds s' times its first moment along the line of sight.
-// Slab: the two faces are the patches whose normal lies within 10 degrees of the direction that carries most area.
+// Slab: the two faces are the patches whose normal lies within 10 degrees of the direction that carries most area; of a
+// bent one, a sheet, its paths tell (optical_path.h).
 #include "render/scatter_forest.h"
 #include "base/memory.h"
 #include <stdlib.h>
@@ -164,11 +165,19 @@ static void build(const builder *b, uint32_t node, uint32_t first_leaf, uint32_t
         b->forest->nodes[node].moments[k][3] = cluster->centre_mm[k];
 }
 
+static int face_of(const alb_patches *patches, const alb_optical_paths *paths, alb_vector axis, uint32_t patch)
+{
+    const double cosine = alb_dot(axis, patches->normals[patch]);
+    if (paths->kind == ALB_OPTICAL_SHEET)
+        return (int)alb_optical_paths_face(paths, patch);
+    return cosine > 0.985 ? ALB_FACE_FRONT : cosine < -0.985 ? ALB_FACE_BACK : ALB_FACE_EDGE;
+}
+
 // The patches of the body, face after face; trees that have any.
 static void plant(alb_forest *forest, const alb_body *body, uint32_t index, const alb_patches *patches,
-                  uint16_t surface, bool slab)
+                  uint16_t surface, bool slab, const alb_optical_paths *paths)
 {
-    const alb_vector axis = slab ? main_normal(body, patches) : (alb_vector){0};
+    const alb_vector axis = slab && paths->kind == ALB_OPTICAL_CONVEX ? main_normal(body, patches) : (alb_vector){0};
     const alb_vector first = patches->centroids[body->patches[0]];
     alb_vector low = first, high = first;
     for (size_t i = 0; i < body->count; i++) {
@@ -185,8 +194,7 @@ static void plant(alb_forest *forest, const alb_body *body, uint32_t index, cons
                          .axis = {(float)axis.x, (float)axis.y, (float)axis.z},
                          .middle_mm = alb_times(0.5, alb_add(low, high))};
         for (size_t i = 0; i < body->count; i++) {
-            const double cosine = alb_dot(axis, patches->normals[body->patches[i]]);
-            if (face == (cosine > 0.985 ? ALB_FACE_FRONT : cosine < -0.985 ? ALB_FACE_BACK : ALB_FACE_EDGE))
+            if (face == face_of(patches, paths, axis, body->patches[i]))
                 forest->patches[forest->leaf_count++] = body->patches[i];
         }
         tree.leaf_count = (uint32_t)forest->leaf_count - tree.first_leaf;
@@ -198,7 +206,8 @@ static void plant(alb_forest *forest, const alb_body *body, uint32_t index, cons
 }
 
 bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_patches *patches,
-                       const uint16_t *materials, const alb_surface *surfaces, alb_error *error)
+                       const uint16_t *materials, const alb_surface *surfaces, const alb_optical_paths *paths,
+                       alb_error *error)
 {
     size_t leaves = 0;
     *forest = (alb_forest){0};
@@ -214,7 +223,7 @@ bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_p
     }
     for (size_t b = 0; b < bodies->count; b++) {
         const uint16_t surface = materials[bodies->bodies[b].patches[0]];
-        plant(forest, &bodies->bodies[b], (uint32_t)b, patches, surface, surfaces[surface].slab);
+        plant(forest, &bodies->bodies[b], (uint32_t)b, patches, surface, surfaces[surface].slab, &paths[b]);
     }
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t t = 0; t < forest->tree_count; t++) {

@@ -1,12 +1,13 @@
 // The sources of scattering in clusters: a binary tree for each face of each body, its leaves patches.
 #pragma once
+#include "render/optical_path.h"
 #include "render/scatter.h"
 
 // Exit patches are taken in blocks of so many consecutive leaves.
 enum { ALB_BLOCK = 8 };
 
 // The runs of a body: faces of a slab, and what is neither (all of a solid).
-enum { ALB_FACE_FRONT, ALB_FACE_EDGE, ALB_FACE_BACK, ALB_FACES };
+enum { ALB_FACE_EDGE = ALB_RIM, ALB_FACE_FRONT = ALB_FRONT, ALB_FACE_BACK = ALB_BACK, ALB_FACES };
 
 typedef struct alb_cluster {
     float centre_mm[3]; // relative to the body's middle
@@ -28,7 +29,7 @@ typedef struct alb_tree {
     uint32_t body, first_node, first_leaf, leaf_count;
     uint16_t surface;
     uint8_t face;
-    float axis[3];        // slab: normal of its faces
+    float axis[3];        // slab: normal of its faces; of a sheet zero
     alb_vector middle_mm; // of the body
 } alb_tree;
 
@@ -48,8 +49,10 @@ static inline uint32_t alb_left_count(uint32_t count)
     return count <= ALB_BLOCK ? count / 2 : (count / 2 + ALB_BLOCK - 1) / ALB_BLOCK * ALB_BLOCK;
 }
 
+// paths: of each body, which tell the faces of sheets.
 bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_patches *patches,
-                       const uint16_t *materials, const alb_surface *surfaces, alb_error *error);
+                       const uint16_t *materials, const alb_surface *surfaces, const alb_optical_paths *paths,
+                       alb_error *error);
 void alb_forest_free(alb_forest *forest);
 // Covariance of a point of the triangle, in the order of alb_cluster.
 void alb_moments_of_triangle(float moments[6], alb_vector a, alb_vector b, alb_vector c);

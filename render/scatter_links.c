@@ -25,13 +25,19 @@ typedef struct wish {
     int8_t level;
 } wish;
 
+// How much longer paths are than straight at a distance and beyond; nearer, in proportion.
+typedef struct detour {
+    float length, at;
+} detour;
+
 // What one thread works with.
 typedef struct workspace {
     wish *wishes;
-    float (*detours)[ALB_BLOCK]; // of each wish: how much longer the paths of the rows are than straight
-    alb_optical_target *targets; // of the wishes
+    detour (*detours)[ALB_BLOCK]; // of each wish and row
+    alb_optical_target *targets;  // of the wishes
     float *distances;
-    size_t wish_count, wish_capacity, detour_capacity, target_capacity, distance_capacity;
+    unsigned char *opposite;
+    size_t wish_count, wish_capacity, detour_capacity, target_capacity, distance_capacity, opposite_capacity;
     alb_optical_workspace paths;
     const alb_optical_paths *paths_of; // whom it serves
     alb_found_links found;
@@ -46,32 +52,38 @@ typedef struct viewer {
     const alb_tree *tree;
     const alb_optical_paths *paths;
     double error_wanted;
-    uint32_t first_leaf, row_count;
+    uint32_t first_leaf, row_count, middle_row;
     float at[3][ALB_BLOCK]; // centroids, rows that are missing stand where the last one does
     float centre[3], radius;
+    float axes[3][ALB_BLOCK]; // slab: its normal, of a sheet the rows' own; else zero
     workspace *work;
 } viewer;
 
-static void project(float v[3], const float axis[3])
+static void project(float v[3], float x, float y, float z)
 {
-    const float across = v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2];
-    for (int k = 0; k < 3; k++)
-        v[k] -= across * axis[k];
+    const float across = v[0] * x + v[1] * y + v[2] * z;
+    v[0] -= across * x, v[1] -= across * y, v[2] -= across * z;
+}
+
+// Lateral to the row's axis.
+static void project_for(float to[3], const viewer *v, uint32_t row)
+{
+    project(to, v->axes[0][row], v->axes[1][row], v->axes[2][row]);
 }
 
 // Mean distances from the rows to the source; across: lateral to the axis.
 ALB_VECTOR_CLONES
 static void measure(float distances[ALB_BLOCK], const viewer *v, const alb_source *from, bool across)
 {
-    const float *m = from->moments, *a = v->tree->axis;
-    const float keep = across ? 1 : 0;
-    const float own = keep * (m[0] * a[0] * a[0] + m[1] * a[1] * a[1] + m[2] * a[2] * a[2] +
-                              2 * (m[3] * a[0] * a[1] + m[4] * a[0] * a[2] + m[5] * a[1] * a[2]));
-    const float trace = m[0] + m[1] + m[2] - own;
+    const float *m = from->moments;
     for (int row = 0; row < ALB_BLOCK; row++) {
+        const float a = across ? v->axes[0][row] : 0, b = across ? v->axes[1][row] : 0,
+                    c = across ? v->axes[2][row] : 0;
+        const float trace = m[0] * (1 - a * a) + m[1] * (1 - b * b) + m[2] * (1 - c * c) -
+                            2 * (m[3] * a * b + m[4] * a * c + m[5] * b * c);
         float x = from->at[0] - v->at[0][row], y = from->at[1] - v->at[1][row], z = from->at[2] - v->at[2][row];
-        const float rise = keep * (x * a[0] + y * a[1] + z * a[2]);
-        x -= rise * a[0], y -= rise * a[1], z -= rise * a[2];
+        const float rise = x * a + y * b + z * c;
+        x -= rise * a, y -= rise * b, z -= rise * c;
         const float squared = x * x + y * y + z * z;
         const float along =
             m[0] * x * x + m[1] * y * y + m[2] * z * z + 2 * (m[3] * x * y + m[4] * x * z + m[5] * y * z);
@@ -89,15 +101,22 @@ static void encode(uint8_t codes[ALB_BLOCK], const float distances[ALB_BLOCK], f
     }
 }
 
-// Direction from the block to the cluster, through a slab along its faces, and the cluster's variance along it.
+static bool is_sheet(const viewer *v) { return v->paths->kind == ALB_OPTICAL_SHEET; }
+
+// Direction from the block to the cluster, through a slab and in a sheet along its faces, and the cluster's variance
+// along it.
 static void aim(int8_t direction[4], const viewer *v, const alb_cluster *cluster, int side)
 {
     float to[3];
     const float *m = cluster->moments;
     for (int k = 0; k < 3; k++)
         to[k] = cluster->centre_mm[k] - v->centre[k];
-    if (side == ALB_TRANSMISSION)
-        project(to, v->tree->axis);
+    if (is_sheet(v)) {
+        const alb_vector there = v->patches->normals[v->forest->patches[cluster->leaf]];
+        project(to, (float)there.x, (float)there.y, (float)there.z);
+    } else if (side == ALB_TRANSMISSION) {
+        project_for(to, v, v->middle_row);
+    }
     const float x = to[0], y = to[1], z = to[2], squared = x * x + y * y + z * z;
     const float along = m[0] * x * x + m[1] * y * y + m[2] * z * z + 2 * (m[3] * x * y + m[4] * x * z + m[5] * y * z);
     memset(direction, 0, 4);
@@ -118,7 +137,12 @@ static void want(const viewer *v, uint32_t node, int side, int level, unsigned l
         work->wishes[work->wish_count++] = (wish){node, (uint8_t)side, (uint8_t)left_out, (int8_t)level};
 }
 
-static void add_link(const viewer *v, const wish *wished, int level, const float detours[ALB_BLOCK])
+static float lengthened(float distance, const detour *by)
+{
+    return by->length != 0 ? distance + by->length * fminf(distance / by->at, 1) : distance;
+}
+
+static void add_link(const viewer *v, const wish *wished, int level, const detour detours[ALB_BLOCK])
 {
     const int side = wished->side;
     const alb_cluster *cluster = &v->forest->clusters[wished->node];
@@ -146,10 +170,10 @@ static void add_link(const viewer *v, const wish *wished, int level, const float
     for (int part = 0; part < count; part++) {
         measure(distances[part], v, &parts[part], side == ALB_TRANSMISSION);
         for (uint32_t row = 0; row < ALB_BLOCK; row++)
-            if (row >= v->row_count || wished->left_out >> row & 1 || !isfinite(detours[row]))
+            if (row >= v->row_count || wished->left_out >> row & 1 || !isfinite(detours[row].length))
                 distances[part][row] = INFINITY;
             else
-                furthest = fmaxf(furthest, distances[part][row] += detours[row]);
+                furthest = fmaxf(furthest, distances[part][row] = lengthened(distances[part][row], &detours[row]));
     }
     int octave = ilogbf(fmaxf(furthest, 1e-30F)) + 1 - kernel->first_octave;
     octave = octave < 0 ? 0 : octave < kernel->octave_count ? octave : kernel->octave_count - 1;
@@ -170,7 +194,7 @@ static void add_link(const viewer *v, const wish *wished, int level, const float
 static void place_triangle(alb_vector t[3], const viewer *v, const alb_cluster *cluster, int side, uint32_t row)
 {
     const alb_vector p = v->patches->centroids[v->forest->patches[v->first_leaf + row]];
-    const alb_vector axis = {(double)v->tree->axis[0], (double)v->tree->axis[1], (double)v->tree->axis[2]};
+    const alb_vector axis = {(double)v->axes[0][row], (double)v->axes[1][row], (double)v->axes[2][row]};
     alb_patch_triangle(t, v->patches, v->forest->patches[cluster->leaf]);
     for (int k = 0; k < 3 && side == ALB_TRANSMISSION; k++)
         t[k] = alb_add(t[k], alb_times(alb_dot(axis, alb_sub(p, t[k])), axis));
@@ -202,7 +226,8 @@ static int level_of(const viewer *v, const alb_cluster *cluster, int side, uint3
     return alb_parts_level(cluster, parts);
 }
 
-static void add_pair(const viewer *v, uint32_t node, int side, uint32_t row)
+// The patch at `scale` times its distances; its integral is then scale^2 times as large.
+static void add_pair(const viewer *v, uint32_t node, int side, uint32_t row, float scale)
 {
     const alb_cluster *cluster = &v->forest->clusters[node];
     const alb_vector p = v->patches->centroids[v->forest->patches[v->first_leaf + row]];
@@ -213,9 +238,13 @@ static void add_pair(const viewer *v, uint32_t node, int side, uint32_t row)
     if (work->found.failed)
         return;
     place_triangle(t, v, cluster, side, row);
+    for (int k = 0; k < 3; k++)
+        t[k] = alb_add(p, alb_times((double)scale, alb_sub(t[k], p)));
     alb_exact_pair *pair = &work->found.pairs[work->found.pair_count++];
-    *pair = (alb_exact_pair){
-        .node = node, .kernel = v->index[side], .row = (uint8_t)row, .per_area = 1 / cluster->area_mm2};
+    *pair = (alb_exact_pair){.node = node,
+                             .kernel = v->index[side],
+                             .row = (uint8_t)row,
+                             .per_area = 1 / (scale * scale * cluster->area_mm2)};
     alb_rule_find(&pair->rule, t, p, v->kernels[side]->near_mm);
 }
 
@@ -257,7 +286,7 @@ static void visit(const viewer *v, uint32_t node, uint32_t leaf, uint32_t count,
     for (int k = 0; k < 3; k++)
         to[k] = cluster->centre_mm[k] - v->centre[k];
     if (side == ALB_TRANSMISSION)
-        project(to, v->tree->axis);
+        project_for(to, v, v->middle_row);
     const float room = sqrtf(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]) - v->radius;
     const int bin = alb_scatter_kernel_bin(v->needs[side], fmaxf(room - 0.5F * cluster->radius_mm, 0));
     if ((side == ALB_TRANSMISSION || cluster->radius_mm <= 0.5F * room) &&
@@ -273,7 +302,8 @@ static void visit(const viewer *v, uint32_t node, uint32_t leaf, uint32_t count,
 // Which profile light takes from one face to another: between the faces of a slab that of transmission.
 static int side_between(const alb_tree *from, const alb_tree *to)
 {
-    return abs(from->face - to->face) == 2 ? ALB_TRANSMISSION : ALB_REFLECTION;
+    return from->face != to->face && from->face != ALB_FACE_EDGE && to->face != ALB_FACE_EDGE ? ALB_TRANSMISSION
+                                                                                              : ALB_REFLECTION;
 }
 
 static void place_rows(viewer *v)
@@ -281,10 +311,15 @@ static void place_rows(viewer *v)
     float middle[3] = {0};
     for (uint32_t row = 0; row < ALB_BLOCK; row++) {
         const uint32_t leaf = v->first_leaf + (row < v->row_count ? row : v->row_count - 1);
-        const alb_vector at = alb_sub(v->patches->centroids[v->forest->patches[leaf]], v->tree->middle_mm);
-        v->at[0][row] = (float)at.x, v->at[1][row] = (float)at.y, v->at[2][row] = (float)at.z;
-        for (int k = 0; k < 3; k++)
-            middle[k] += v->at[k][row] / ALB_BLOCK;
+        const alb_vector at = alb_sub(v->patches->centroids[v->forest->patches[leaf]], v->tree->middle_mm),
+                         own = v->patches->normals[v->forest->patches[leaf]];
+        const float places[3] = {(float)at.x, (float)at.y, (float)at.z},
+                    normal[3] = {(float)own.x, (float)own.y, (float)own.z};
+        for (int k = 0; k < 3; k++) {
+            v->at[k][row] = places[k];
+            v->axes[k][row] = is_sheet(v) ? normal[k] : v->tree->axis[k];
+            middle[k] += places[k] / ALB_BLOCK;
+        }
     }
     v->radius = 0;
     memcpy(v->centre, middle, sizeof middle);
@@ -307,15 +342,16 @@ static uint32_t middle_row(const viewer *v)
     return middle;
 }
 
-// How much longer the paths inside the body are than the segments from the block to the clusters: of its middle row,
-// for all. Beyond the reach a path is taken as long as that: of light so far away it matters only that it is not lost.
-static void measure_detours(const viewer *v)
+// Paths from a row to the wishes' clusters, and then to the other rows.
+static void measure_paths(const viewer *v, uint32_t from)
 {
     workspace *work = v->work;
-    const size_t n = work->wish_count;
-    work->targets = alb_grow(&work->found.failed, work->targets, &work->target_capacity, 0, n, sizeof *work->targets);
+    const size_t n = work->wish_count, all = n + v->row_count;
+    const alb_vector middle = v->tree->middle_mm;
+    work->targets = alb_grow(&work->found.failed, work->targets, &work->target_capacity, 0, all, sizeof *work->targets);
     work->distances =
-        alb_grow(&work->found.failed, work->distances, &work->distance_capacity, 0, n, sizeof *work->distances);
+        alb_grow(&work->found.failed, work->distances, &work->distance_capacity, 0, all, sizeof *work->distances);
+    work->opposite = alb_grow(&work->found.failed, work->opposite, &work->opposite_capacity, 0, all, 1);
     if (work->paths_of != v->paths && !work->found.failed) {
         alb_optical_workspace_free(&work->paths);
         work->found.failed = !alb_optical_workspace_create(&work->paths, v->paths, NULL);
@@ -323,27 +359,63 @@ static void measure_detours(const viewer *v)
     }
     if (work->found.failed)
         return;
-    for (size_t k = 0; k < n; k++) {
-        const alb_cluster *cluster = &v->forest->clusters[work->wishes[k].node];
-        const alb_vector middle = v->tree->middle_mm;
-        work->targets[k] = (alb_optical_target){
-            v->forest->patches[cluster->leaf], (float)(middle.x + (double)cluster->centre_mm[0]),
-            (float)(middle.y + (double)cluster->centre_mm[1]), (float)(middle.z + (double)cluster->centre_mm[2])};
+    for (size_t k = 0; k < all; k++) {
+        const alb_cluster *cluster = k < n ? &v->forest->clusters[work->wishes[k].node] : NULL;
+        const uint32_t row = (uint32_t)(k - n), leaf = cluster ? cluster->leaf : v->first_leaf + row;
+        float at[3];
+        for (int i = 0; i < 3; i++)
+            at[i] = cluster ? cluster->centre_mm[i] : v->at[i][row];
+        work->targets[k] = (alb_optical_target){v->forest->patches[leaf], (float)(middle.x + (double)at[0]),
+                                                (float)(middle.y + (double)at[1]), (float)(middle.z + (double)at[2])};
     }
-    const uint32_t patch = v->forest->patches[v->first_leaf + middle_row(v)];
-    const alb_vector from = v->patches->centroids[patch];
-    alb_optical_paths_measure(work->distances, NULL, &work->paths, v->paths, patch, work->targets, n);
-    for (size_t k = 0; k < n; k++) {
-        const alb_optical_target *to = &work->targets[k];
-        const alb_vector at = {(double)to->x_mm, (double)to->y_mm, (double)to->z_mm};
-        const float straight = (float)alb_length(alb_sub(at, from)),
-                    detour = fminf(work->distances[k], fmaxf((float)v->paths->reach_mm, straight)) - straight;
-        for (int row = 0; row < ALB_BLOCK; row++)
-            work->detours[k][row] = detour > 1e-4F * straight ? detour : 0;
-    }
+    alb_optical_paths_measure(work->distances, work->opposite, &work->paths, v->paths,
+                              v->forest->patches[v->first_leaf + from], work->targets, all);
 }
 
-// Links and exact pairs from the wishes; what goes a detour is not exact.
+static float chord_to(float to[3], const viewer *v, uint32_t from, const float at[3])
+{
+    for (int i = 0; i < 3; i++)
+        to[i] = at[i] - v->at[i][from];
+    return sqrtf(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]);
+}
+
+// How much longer the paths inside the body are than what `measure` says: of this row, for those in the mask that it
+// may stand for, which is told. In a sheet they also say which face is lit, but about the rim. Beyond the reach a path
+// is taken as long as that: of light so far away it matters only that it is not lost.
+static unsigned find_detours(const viewer *v, uint32_t from, unsigned rows)
+{
+    workspace *work = v->work;
+    const size_t n = work->wish_count;
+    unsigned served = 1U << from;
+    float to[3];
+    measure_paths(v, from);
+    if (work->found.failed)
+        return rows;
+    for (uint32_t row = 0; row < v->row_count; row++) {
+        const float chord = chord_to(to, v, from, (const float[3]){v->at[0][row], v->at[1][row], v->at[2][row]});
+        if (work->distances[n + row] <= 1.2F * chord) // else one patch beyond a fold of the other
+            served |= rows & 1U << row;
+    }
+    for (size_t k = 0; k < n; k++) {
+        wish *wished = &work->wishes[k];
+        const alb_cluster *cluster = &v->forest->clusters[wished->node];
+        if (is_sheet(v) && v->tree->face != ALB_FACE_EDGE &&
+            alb_optical_paths_face(v->paths, v->forest->patches[cluster->leaf]) != ALB_RIM)
+            wished->side = work->opposite[k] ? ALB_TRANSMISSION : ALB_REFLECTION;
+        const float chord = chord_to(to, v, from, cluster->centre_mm);
+        if (wished->side == ALB_TRANSMISSION)
+            project_for(to, v, from);
+        const float straight = sqrtf(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]),
+                    path = fminf(work->distances[k], fmaxf((float)v->paths->reach_mm, chord)),
+                    more = fabsf(path - straight) > 1e-4F * straight ? path - straight : 0;
+        for (uint32_t row = 0; row < ALB_BLOCK; row++)
+            if (served >> row & 1)
+                work->detours[k][row] = (detour){more, fmaxf(straight, cluster->radius_mm)};
+    }
+    return served;
+}
+
+// Links and exact pairs from the wishes; what goes a long detour is not exact.
 static void grant(const viewer *v)
 {
     workspace *work = v->work;
@@ -352,8 +424,10 @@ static void grant(const viewer *v)
     if (work->found.failed || !n)
         return;
     memset(work->detours, 0, n * sizeof *work->detours);
-    if (v->paths->kind != ALB_OPTICAL_CONVEX)
-        measure_detours(v);
+    unsigned left = v->paths->kind == ALB_OPTICAL_CONVEX ? 0 : (1U << v->row_count) - 1;
+    for (uint32_t row = v->middle_row; left; row = (row + 1) % v->row_count)
+        if (left >> row & 1)
+            left &= ~find_detours(v, row, left);
     for (size_t k = 0; !work->found.failed && k < n; k++) {
         const wish *wished = &work->wishes[k];
         uint32_t row = 0;
@@ -363,10 +437,12 @@ static void grant(const viewer *v)
         }
         while (wished->left_out >> row & 1)
             row++;
-        if (work->detours[k][row] > 0)
-            add_link(v, wished, 3, work->detours[k]);
+        const detour *by = &work->detours[k][row];
+        const float scale = by->length != 0 ? 1 + by->length / by->at : 1;
+        if (scale > 0.5F && scale < 1.25F)
+            add_pair(v, wished->node, wished->side, row, scale);
         else
-            add_pair(v, wished->node, wished->side, row);
+            add_link(v, wished, 3, work->detours[k]);
     }
 }
 
@@ -374,6 +450,7 @@ static void link_block(alb_link_block *block, viewer *v, const uint16_t kernels[
 {
     v->work->wish_count = v->work->found.count = v->work->found.code_count = v->work->found.pair_count = 0;
     place_rows(v);
+    v->middle_row = middle_row(v);
     for (size_t t = 0; t < v->forest->tree_count; t++) {
         const alb_tree *tree = &v->forest->trees[t];
         if (tree->body == v->tree->body)
@@ -443,6 +520,7 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
         free(work.detours);
         free(work.targets);
         free(work.distances);
+        free(work.opposite);
         alb_optical_workspace_free(&work.paths);
         alb_found_links_free(&work.found);
     }

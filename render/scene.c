@@ -2,7 +2,9 @@
 #include "base/memory.h"
 #include "calibrate/calibration.h"
 #include "render/scene_reader.h"
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 void alb_scene_free(alb_scene *scene)
 {
@@ -11,14 +13,36 @@ void alb_scene_free(alb_scene *scene)
         alb_light_free(&scene->lights[i]);
     free(scene->lights);
     free(scene->surfaces);
+    free(scene->objects);
     *scene = (alb_scene){0};
+}
+
+bool alb_scene_frame_name(char out[ALB_PATH_SIZE], const char *name, int frame, alb_error *error)
+{
+    size_t length = 0;
+    for (const char *at = name; *at && length < ALB_PATH_SIZE;) {
+        const size_t digits = strspn(at, "#");
+        if (digits) {
+            const int written = snprintf(out + length, ALB_PATH_SIZE - length, "%0*d", (int)digits, frame);
+            length += (size_t)written;
+            at += digits;
+        } else
+            out[length++] = *at++;
+    }
+    if (length >= ALB_PATH_SIZE)
+        return alb_fail(error, ALB_BAD_DATA, "%.80s: the path of frame %d is too long", name, frame);
+    out[length] = '\0';
+    return true;
 }
 
 // A file the scene refers to: its path, entered in the provenance.
 bool alb_scene_input(char path[ALB_PATH_SIZE], alb_scene_reader *in, alb_node node, const char *key)
 {
     const char *name;
-    return alb_node_text(&name, node, key, in->error) && alb_path_join(path, in->folder, name, in->error) &&
+    char framed[ALB_PATH_SIZE];
+    return alb_node_text(&name, node, key, in->error) &&
+           (in->scene->frames < 2 || alb_scene_frame_name(framed, name, in->frame, in->error)) &&
+           alb_path_join(path, in->folder, in->scene->frames < 2 ? name : framed, in->error) &&
            alb_provenance_add(in->provenance, path, in->error);
 }
 
@@ -42,7 +66,10 @@ static bool read_direction(alb_vector *out, alb_node node, const char *key, alb_
 static bool read_environment(alb_light *light, alb_scene_reader *in, alb_node node)
 {
     char path[ALB_PATH_SIZE];
-    if (!alb_node_allow(node, "kind radiance file", in->error))
+    if (!alb_node_allow(node, "kind radiance file centre_mm radius_mm", in->error) ||
+        (alb_node_has(node, "radius_mm") &&
+         (!alb_node_number(&light->radius_mm, node, "radius_mm", 1e-6, ALB_SCENE_LONGEST_MM, in->error) ||
+          !alb_scene_vector(&light->position_mm, node, "centre_mm", in->error))))
         return false;
     if (!alb_node_has(node, "file"))
         return alb_node_numbers(light->radiance, 3, node, "radiance", 0, 1e12, in->error);
@@ -162,25 +189,32 @@ static bool read_camera(alb_scene_reader *in, alb_node root)
 static bool read_settings(alb_scene *scene, alb_node root, alb_error *error)
 {
     const bool stated = alb_node_has(root, "error_percent");
-    long rays = stated ? 64 : 256, seed = 1, memory_mb = 4096;
+    long rays = stated ? 64 : 256, seed = 1, memory_mb = 4096, frames = 1;
     scene->residual = 1e-4;
     if ((stated && !alb_node_number(&scene->error_percent, root, "error_percent", 0.01, 100, error)) ||
         (alb_node_has(root, "memory_mb") && !alb_node_integer(&memory_mb, root, "memory_mb", 1, 1L << 24, error)) ||
         (alb_node_has(root, "rays_per_patch") && !alb_node_integer(&rays, root, "rays_per_patch", 1, 65536, error)) ||
+        (alb_node_has(root, "frames") && !alb_node_integer(&frames, root, "frames", 1, ALB_FRAMES_MAX, error)) ||
         (alb_node_has(root, "seed") && !alb_node_integer(&seed, root, "seed", 0, 0x7fffffff, error)) ||
         (alb_node_has(root, "residual") && !alb_node_number(&scene->residual, root, "residual", 1e-12, 0.1, error)))
         return false;
     scene->rays_per_patch = (int)rays;
     scene->memory_bytes = (size_t)memory_mb << 20;
     scene->seed = (uint64_t)seed;
+    scene->frames = (int)frames;
     return true;
 }
 
 bool alb_scene_read(alb_scene *scene, alb_provenance *provenance, const char *path, alb_error *error)
 {
+    return alb_scene_read_frame(scene, provenance, path, 0, error);
+}
+
+bool alb_scene_read_frame(alb_scene *scene, alb_provenance *provenance, const char *path, int frame, alb_error *error)
+{
     char folder[ALB_PATH_SIZE];
     alb_node root;
-    alb_scene_reader in = {scene, provenance, folder, error};
+    alb_scene_reader in = {scene, provenance, folder, frame, error};
     *scene = (alb_scene){0};
     if (!alb_path_folder(folder, path, error))
         return false;
@@ -188,7 +222,8 @@ bool alb_scene_read(alb_scene *scene, alb_provenance *provenance, const char *pa
     const bool ok =
         record && alb_provenance_add(provenance, path, error) && alb_record_root(&root, record, error) &&
         alb_node_allow(root,
-                       "format objects materials lights camera rays_per_patch error_percent memory_mb residual seed",
+                       "format objects materials lights camera rays_per_patch error_percent memory_mb residual seed "
+                       "frames",
                        error) &&
         read_settings(scene, root, error) && alb_scene_read_surfaces(&in, root) && alb_scene_read_objects(&in, root) &&
         read_lights(&in, root) && read_camera(&in, root);

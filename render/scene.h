@@ -14,16 +14,19 @@
 //               {"kind": "spot", "position_mm": [..], "direction": [..], "half_angle_deg": 10, "flux": [..]},
 //               {"kind": "projector", "centre_mm": [..], "direction": [..], "blur_sd_mm": 0.1, "flux": [..],
 //                "diameter_mm": 1 | "pixel_mm": 0.25, "diameter_px": 4},
-//               {"kind": "environment", "radiance": [..] | "file": "sky.exr"}],
+//               {"kind": "environment", "radiance": [..] | "file": "sky.exr", "centre_mm": [..], "radius_mm": 500}],
 //    "camera": {"calibration": "SESSION", "side": "reflection"} |
 //              {"position_mm": [..], "look_at_mm": [..], "up": [0,1,0], "vertical_field_deg": 40,
 //               "width": 640, "height": 480},
-//    "rays_per_patch": 256, "error_percent": 1, "memory_mb": 4096, "residual": 1e-4, "seed": 1}
+//    "rays_per_patch": 256, "error_percent": 1, "memory_mb": 4096, "residual": 1e-4, "seed": 1, "frames": 1}
 // mm_per_unit 1, translate_mm 0, subdivide_mm none, grading 1, inward false, path "solid", blur_sd_mm 0, finish
 // "smooth", lights none, rays_per_patch 256, memory_mb 4096, residual 1e-4 and seed 1 are what stands where nothing is
 // written. With error_percent, rows start at rays_per_patch (64 where nothing is written) and grow until the rms error
 // of the irradiance by rays is that or every row has ALB_RAYS_REFINED_MAX. Rays beyond memory_mb lie in a temporary
-// file. Paths are relative to the file. Units are the user's as long as they agree: flux 1 makes the picture radiance
+// file. With frames above 1 every run of # in the name of a file stands for the frame's number, 0 to frames - 1, with
+// zeros in front. For --method shadow objects take "shadow": "casts" (what stands where nothing is written) |
+// "receives", and an environment with radius_mm lies on a sphere of that radius instead of infinitely far away.
+// Paths are relative to the file. Units are the user's as long as they agree: flux 1 makes the picture radiance
 // per incident flux, 1/(mm^2 sr).
 #pragma once
 #include "base/camera.h"
@@ -32,9 +35,18 @@
 #include "render/scatter.h"
 
 enum { ALB_OBJECTS_MAX = 256, ALB_SURFACES_MAX = 256, ALB_LIGHTS_MAX = 64, ALB_RAYS_REFINED_MAX = 4096 };
+enum { ALB_FRAMES_MAX = 100000 };
+
+// The vertices of one object in the scene's mesh.
+typedef struct alb_object {
+    size_t first_vertex, vertex_count;
+    bool receives_only; // casts no shadow: ground, walls
+} alb_object;
 
 typedef struct alb_scene {
     alb_mesh mesh; // all objects, mm; groups index surfaces. Objects share no vertices
+    alb_object *objects;
+    size_t object_count;
     alb_surface *surfaces;
     size_t surface_count;
     alb_light *lights;
@@ -45,8 +57,15 @@ typedef struct alb_scene {
     size_t memory_bytes;  // 0: no limit
     double residual;
     uint64_t seed;
+    int frames; // of the sequence; 1: a still
 } alb_scene;
 
-// Reads the scene and all it refers to; every file read is added to the provenance's inputs.
+// Reads the scene and all it refers to; every file read is added to the provenance's inputs. Of a sequence the first
+// frame.
 bool alb_scene_read(alb_scene *scene, alb_provenance *provenance, const char *path, alb_error *error);
+// Any frame of a sequence, 0 to frames - 1.
+bool alb_scene_read_frame(alb_scene *scene, alb_provenance *provenance, const char *path, int frame, alb_error *error);
+// `name` with each run of # replaced by the number, as many digits as there are #, zeros in front; more where it is
+// longer. False: the result is longer than a path may be.
+bool alb_scene_frame_name(char out[ALB_PATH_SIZE], const char *name, int frame, alb_error *error);
 void alb_scene_free(alb_scene *scene);

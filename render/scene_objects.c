@@ -1,4 +1,5 @@
 // "objects" of SCENE.json: meshes and shapes, placed, cut to size and joined to one mesh of the scene's materials.
+#include "base/memory.h"
 #include "render/scene_reader.h"
 #include "render/shape.h"
 #include <string.h>
@@ -45,7 +46,7 @@ static bool assign_materials(alb_mesh *mesh, alb_scene_reader *in, alb_node obje
 static bool read_mesh(alb_mesh *mesh, double *scale, alb_vector *offset, alb_scene_reader *in, alb_node node)
 {
     char path[ALB_PATH_SIZE];
-    if (!alb_node_allow(node, "mesh mm_per_unit material materials translate_mm subdivide_mm", in->error) ||
+    if (!alb_node_allow(node, "mesh mm_per_unit material materials translate_mm subdivide_mm shadow", in->error) ||
         (alb_node_has(node, "mm_per_unit") && !alb_node_number(scale, node, "mm_per_unit", 1e-6, 1e6, in->error)) ||
         (alb_node_has(node, "translate_mm") && !alb_scene_vector(offset, node, "translate_mm", in->error)) ||
         !alb_scene_input(path, in, node, "mesh"))
@@ -57,7 +58,7 @@ static bool read_box(alb_mesh *mesh, alb_scene_reader *in, alb_node node)
 {
     double size[3], cells[3];
     alb_box box = {.grading = 1};
-    if (!alb_node_allow(node, "shape size_mm centre_mm cells grading inward material subdivide_mm", in->error) ||
+    if (!alb_node_allow(node, "shape size_mm centre_mm cells grading inward material subdivide_mm shadow", in->error) ||
         !alb_node_numbers(size, 3, node, "size_mm", 1e-6, ALB_SCENE_LONGEST_MM, in->error) ||
         !alb_scene_vector(&box.centre_mm, node, "centre_mm", in->error) ||
         !alb_node_numbers(cells, 3, node, "cells", 1, 4096, in->error) ||
@@ -77,7 +78,7 @@ static bool read_sphere(alb_mesh *mesh, alb_scene_reader *in, alb_node node)
 {
     alb_sphere sphere = {0};
     long subdivisions;
-    if (!alb_node_allow(node, "shape radius_mm centre_mm subdivisions inward material", in->error) ||
+    if (!alb_node_allow(node, "shape radius_mm centre_mm subdivisions inward material shadow", in->error) ||
         !alb_node_number(&sphere.radius_mm, node, "radius_mm", 1e-6, ALB_SCENE_LONGEST_MM, in->error) ||
         !alb_scene_vector(&sphere.centre_mm, node, "centre_mm", in->error) ||
         !alb_node_integer(&subdivisions, node, "subdivisions", 0, 8, in->error) ||
@@ -96,6 +97,17 @@ static bool read_shape(alb_mesh *mesh, alb_scene_reader *in, alb_node node)
     return shape == 0 ? read_box(mesh, in, node) : read_sphere(mesh, in, node);
 }
 
+// Where the object's vertices come to lie, and what it does to light.
+static bool note_object(alb_object *object, const alb_mesh *placed, alb_scene_reader *in, alb_node node)
+{
+    static const char *const roles[] = {"casts", "receives"};
+    int role = 0;
+    if (alb_node_has(node, "shadow") && !alb_node_choice(&role, node, "shadow", roles, 2, in->error))
+        return false;
+    *object = (alb_object){in->scene->mesh.vertex_count, placed->vertex_count, role == 1};
+    return true;
+}
+
 static bool read_object(alb_scene_reader *in, alb_node node)
 {
     double scale = 1, longest_mm = 0;
@@ -106,7 +118,9 @@ static bool read_object(alb_scene_reader *in, alb_node node)
     if (ok && alb_node_has(node, "subdivide_mm"))
         ok = alb_node_number(&longest_mm, node, "subdivide_mm", 1e-6, ALB_SCENE_LONGEST_MM, in->error) &&
              alb_mesh_subdivide(&placed, longest_mm, in->error);
-    ok = ok && alb_mesh_append(&in->scene->mesh, &placed, 1, (alb_vector){0}, in->error);
+    ok = ok && note_object(&in->scene->objects[in->scene->object_count], &placed, in, node) &&
+         alb_mesh_append(&in->scene->mesh, &placed, 1, (alb_vector){0}, in->error);
+    in->scene->object_count += ok;
     alb_mesh_free(&mesh);
     alb_mesh_free(&placed);
     return ok;
@@ -120,6 +134,8 @@ bool alb_scene_read_objects(alb_scene_reader *in, alb_node root)
         return false;
     if (!count || count > ALB_OBJECTS_MAX)
         return alb_node_fail(in->error, root, "objects", "%zu objects; 1 to %d are needed", count, ALB_OBJECTS_MAX);
+    if (!(in->scene->objects = alb_allocate(count, sizeof *in->scene->objects, in->error)))
+        return false;
     for (size_t i = 0; i < count; i++)
         if (!alb_node_item_object(&node, list, i, in->error) || !read_object(in, node))
             return false;

@@ -10,6 +10,7 @@ typedef struct alb_scene_reader {
     alb_scene *scene;
     alb_provenance *provenance;
     const char *folder; // of SCENE.json
+    int frame;
     alb_error *error;
 } alb_scene_reader;
 

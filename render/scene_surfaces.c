@@ -32,6 +32,7 @@ static bool read_measured(alb_surface *surface, alb_scene_reader *in, alb_node n
         !alb_material_read(&material, path, in->error) || !read_slab_path(&surface->slab, node, in->error))
         return false;
     surface->scatters = true;
+    surface->thickness_mm = material.thickness_mm;
     for (int side = 0; side < ALB_SIDES; side++)
         surface->exits[side] = alb_material_exit(&material, (alb_side)side);
     for (int side = 0; side <= (surface->slab ? ALB_TRANSMISSION : ALB_REFLECTION); side++)

@@ -12,8 +12,8 @@ void alb_sh_rotate(double *out, const double *in, int order, const double rotati
 void alb_sh_axis_rotation(double rotation[3][3], alb_vector axis);
 
 // In single precision, errors below 2e-6 of the coefficients' norm at every angle.
-// Of a function given in the world the coefficients in the frame of its item's axis, axes[c * stride + r] of length one
-// to rounding; and back.
+// Of a function given in the world the coefficients in the frame of its item's axis, axes[c * stride + r] of any
+// length; and back. A length of zero turns nothing.
 void alb_sh_to_axis_batch(float *out, const float *in, int order, const float *axes, size_t stride, size_t count);
 void alb_sh_from_axis_batch(float *out, const float *in, int order, const float *axes, size_t stride, size_t count);
 // By quaternions x, y, z, w at [c * stride + r], of any length but zero.

@@ -6,39 +6,35 @@
 #include "render/sh_rotate.h"
 #include <pthread.h>
 
-// Rows of the quarter turn: the coefficients they read, and times what; `back` is the transpose.
-typedef struct quarter {
-    int begin[ALB_SH_COUNT_MAX + 1], column[4 * ALB_SH_COUNT_MAX];
-    float value[4 * ALB_SH_COUNT_MAX];
-} quarter;
-static quarter forth, back;
+// A row of the quarter turn: the coefficients it reads, at most four up to l = 7, and times what; `back` is the
+// transpose.
+typedef struct row {
+    int count, column[4];
+    float value[4];
+} row;
+static row forth[ALB_SH_COUNT_MAX], back[ALB_SH_COUNT_MAX];
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
 // From columns of unit vectors turned; what is below rounding is zero.
-static void make_quarter(quarter *q, double sign)
+static void make_quarter(row *rows, double sign)
 {
     const double turn[3][3] = {{1, 0, 0}, {0, 0, -sign}, {0, sign, 0}};
-    static double columns[ALB_SH_COUNT_MAX][ALB_SH_COUNT_MAX];
     for (int j = 0; j < ALB_SH_COUNT_MAX; j++) {
-        double unit[ALB_SH_COUNT_MAX] = {0};
-        unit[j] = 1;
-        alb_sh_rotate(columns[j], unit, ALB_SH_ORDER_MAX, turn);
-    }
-    int count = 0;
-    for (int i = 0; i < ALB_SH_COUNT_MAX; i++) {
-        for (int j = 0; j < ALB_SH_COUNT_MAX; j++)
-            if (fabs(columns[j][i]) > 1e-12) {
-                q->column[count] = j;
-                q->value[count++] = (float)columns[j][i];
+        double column[ALB_SH_COUNT_MAX] = {0};
+        column[j] = 1;
+        alb_sh_rotate(column, column, ALB_SH_ORDER_MAX, turn);
+        for (int i = 0; i < ALB_SH_COUNT_MAX; i++)
+            if (fabs(column[i]) > 1e-12) {
+                rows[i].column[rows[i].count] = j;
+                rows[i].value[rows[i].count++] = (float)column[i];
             }
-        q->begin[i + 1] = count;
     }
 }
 
 static void make_quarters(void)
 {
-    make_quarter(&forth, 1);
-    make_quarter(&back, -1);
+    make_quarter(forth, 1);
+    make_quarter(back, -1);
 }
 
 // cos and sin of one angle an item.
@@ -50,6 +46,12 @@ typedef struct angle {
 ALB_LANES_INLINE void mix(alb_lanes out, float p, const alb_lanes x, float q, const alb_lanes y)
 {
     ALB_EACH_LANE out[lane] = p * x[lane] + q * y[lane];
+}
+
+ALB_LANES_INLINE void mix_four(alb_lanes out, const float v[4], const alb_lanes a, const alb_lanes b, const alb_lanes c,
+                               const alb_lanes d)
+{
+    ALB_EACH_LANE out[lane] = v[0] * a[lane] + v[1] * b[lane] + v[2] * c[lane] + v[3] * d[lane];
 }
 
 ALB_LANES_INLINE void multiply(alb_lanes out, float p, const alb_lanes x) { ALB_EACH_LANE out[lane] = p * x[lane]; }
@@ -80,12 +82,12 @@ ALB_LANES_INLINE void turn_x(alb_lanes *out, alb_lanes *in, int order, float sig
         mix(out[14], sign * q6, in[9], -sign * q10, in[11]);
         mix(out[15], -q15, in[13], 0.25F, in[15]);
     }
-    const quarter *q = sign > 0 ? &forth : &back;
     for (int i = 16; i < order * order; i++) {
-        int k = q->begin[i];
-        multiply(out[i], q->value[k], in[q->column[k]]);
-        for (k++; k < q->begin[i + 1]; k++)
-            mix(out[i], 1, out[i], q->value[k], in[q->column[k]]);
+        const row *r = sign > 0 ? &forth[i] : &back[i];
+        if (r->count > 2)
+            mix_four(out[i], r->value, in[r->column[0]], in[r->column[1]], in[r->column[2]], in[r->column[3]]);
+        else
+            mix(out[i], r->value[0], in[r->column[0]], r->value[1], in[r->column[1]]);
     }
 }
 

@@ -45,6 +45,7 @@ typedef enum alb_sh_law_kind {
     ALB_SH_LAW_ENERGY,     // M with eta = sin(tau) tau': as printed. A light's flux never falls off
     ALB_SH_LAW_LIGHT,      // k^-2 times the former for k > 1: a light's flux falls off; visibility's law for k < 1
     ALB_SH_LAW_OCCLUSION,  // 1 - visibility: M for k <= 1, from 1.3 on only tau < pi/2 of it; a blend between
+    ALB_SH_LAW_REGRESSED,  // 1 - visibility, k > 1: least squares over clusters of spheres (render/sh_regress.h)
     ALB_SH_LAWS
 } alb_sh_law_kind;
 
@@ -55,13 +56,13 @@ typedef struct alb_sh_law {
     int order_out, order_in;
 } alb_sh_law;
 
-// "visibility", "energy", "light", "occlusion".
+// "visibility", "energy", "light", "occlusion", "regressed".
 extern const char *const alb_sh_law_names[ALB_SH_LAWS];
 // "cone", "midrange", "sphere".
 extern const char *const alb_sh_map_names[ALB_SH_MAP_CUSTOM];
 
-// Whether such a law exists: the sphere map knows occlusion only, the mid-range map visibility and energy only.
-// ALB_USAGE.
+// Whether such a law exists: the sphere map knows occlusion only, the mid-range map visibility and energy only, the
+// regressed law is of the cone map, alpha 45, order 4. ALB_USAGE.
 bool alb_sh_law_check(const alb_sh_law *law, alb_error *error);
 // M of the law at k, continuous in k, the identity at k = 1 (mid-range 0) for square cone and mid-range laws.
 bool alb_sh_law_at(alb_sh_scaling *scaling, const alb_sh_law *law, double k, alb_error *error);

@@ -13,7 +13,10 @@ typedef float eight __attribute__((vector_size(LANES * sizeof(float))));
 typedef int32_t eight_bits __attribute__((vector_size(LANES * sizeof(int32_t))));
 #define INLINE static inline __attribute__((always_inline))
 
-static bool falls(const alb_sh_law *law) { return law->kind == ALB_SH_LAW_LIGHT || law->kind == ALB_SH_LAW_OCCLUSION; }
+static bool falls(const alb_sh_law *law)
+{
+    return law->kind == ALB_SH_LAW_LIGHT || law->kind == ALB_SH_LAW_OCCLUSION || law->kind == ALB_SH_LAW_REGRESSED;
+}
 
 bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, alb_error *error)
 {

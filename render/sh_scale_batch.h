@@ -12,7 +12,8 @@ typedef struct alb_sh_batch {
 } alb_sh_batch;
 
 // cells: even, from 8 to 4096; 256 give an error of 2e-4 in M for the cone map of order 4, a quarter of it for twice as
-// many; the sphere map's has a square root at k = 1 and 256 cells give 0.02 there. Orders up to 8. Release with alb_sh_batch_free.
+// many; the sphere map's has a square root at k = 1 and 256 cells give 0.04 there. Orders up to 8. Release with
+// alb_sh_batch_free.
 bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, alb_error *error);
 void alb_sh_batch_free(alb_sh_batch *batch);
 // out[i * stride + r] = M(k[r]) in, coefficient i of receiver r < count <= stride (render/sh.h). `out` may not overlap

@@ -3,10 +3,10 @@
 // alpha there for ever). M_w is a projector at k = 1, so the whole M fades into it from k = 1 to 1.3.
 //
 // Where it stops being true: shells inside the object see it beyond pi/2; for them k <= 1 and the whole M.
-#include "render/sh_scale.h"
+#include "render/sh_regress.h"
 #include <math.h>
 
-const char *const alb_sh_law_names[ALB_SH_LAWS] = {"visibility", "energy", "light", "occlusion"};
+const char *const alb_sh_law_names[ALB_SH_LAWS] = {"visibility", "energy", "light", "occlusion", "regressed"};
 const char *const alb_sh_map_names[ALB_SH_MAP_CUSTOM] = {"cone", "midrange", "sphere"};
 
 static const double blend_end = 1.3;
@@ -18,6 +18,11 @@ bool alb_sh_law_check(const alb_sh_law *law, alb_error *error)
         return alb_fail(error, ALB_USAGE, "the sphere map scales occlusion; %s needs the cone map", name);
     if (law->map == ALB_SH_MAP_MIDRANGE && law->kind != ALB_SH_LAW_VISIBILITY && law->kind != ALB_SH_LAW_ENERGY)
         return alb_fail(error, ALB_USAGE, "the mid-range map scales light around: visibility or energy, not %s", name);
+    if (law->kind == ALB_SH_LAW_REGRESSED &&
+        (law->map != ALB_SH_MAP_CONE || law->alpha_deg != 45 || law->order_out != ALB_SH_REGRESS_ORDER ||
+         law->order_in != ALB_SH_REGRESS_ORDER))
+        return alb_fail(error, ALB_USAGE, "the regressed law is fitted for the cone map, alpha 45 and order %d",
+                        ALB_SH_REGRESS_ORDER);
     return true;
 }
 
@@ -71,6 +76,10 @@ bool alb_sh_law_at(alb_sh_scaling *scaling, const alb_sh_law *law, double k, alb
         return alb_sh_scaling_midrange(scaling, k, measure, law->order_out, law->order_in, error);
     if (law->kind == ALB_SH_LAW_OCCLUSION)
         return occlusion_at(scaling, law, &map, error);
+    if (law->kind == ALB_SH_LAW_REGRESSED && k > 1) {
+        alb_sh_regress_at(scaling, k);
+        return true;
+    }
     if (!alb_sh_scaling_compute(scaling, &map, measure, law->order_out, law->order_in, error))
         return false;
     if (fall_off)

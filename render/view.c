@@ -157,3 +157,27 @@ double alb_view_brightest(const alb_scene *scene, const alb_solution *s)
     }
     return brightest;
 }
+
+static int by_size(const void *a, const void *b)
+{
+    const float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+bool alb_view_exposure(double *exposure, const alb_image *picture, double brightest, alb_error *error)
+{
+    const size_t pixels = (size_t)picture->width * (size_t)picture->height;
+    float *values = alb_allocate(pixels, sizeof *values, error);
+    size_t count = 0;
+    if (!values)
+        return false;
+    for (size_t i = 0; i < pixels; i++) {
+        const float *p = picture->pixels + 3 * i, value = fmaxf(p[0], fmaxf(p[1], p[2]));
+        if (value > 0 && (double)value <= 1.001 * brightest)
+            values[count++] = value;
+    }
+    qsort(values, count, sizeof *values, by_size);
+    *exposure = count ? 0.9 / (double)values[(size_t)(0.99 * (double)(count - 1))] : 1;
+    free(values);
+    return true;
+}

@@ -8,3 +8,6 @@
 bool alb_view_render(alb_image *picture, const alb_scene *scene, const alb_solution *solution, alb_error *error);
 // The largest radiance of what does not emit, seen from anywhere: lamps and sky may be brighter.
 double alb_view_brightest(const alb_scene *scene, const alb_solution *solution);
+// The exposure that shows the 99th percentile of the lit pixels' largest channel at 0.9; brighter ones than
+// `brightest`, lamps and sky, are left out.
+bool alb_view_exposure(double *exposure, const alb_image *picture, double brightest, alb_error *error);

@@ -507,7 +507,7 @@ static void hollows_are_gone_around(void **state)
     world w = {0};
     check_ok(make_squares(&w.mesh, &shape, 8, 1, &error), &error);
     world_of_mesh(&w, &wax);
-    assert_true(w.scatter.bodies[0].closed && !w.scatter.bodies[0].convex && w.scatter.bodies[0].detours);
+    assert_true(w.scatter.bodies[0].closed && w.scatter.bodies[0].paths == ALB_OPTICAL_SOLID);
     const size_t n = w.patches.count;
     plane_region region;
     make_region(&region, &shape);

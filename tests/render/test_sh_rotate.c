@@ -159,6 +159,21 @@ static void axis_at_the_poles(void **state)
     }
 }
 
+// The length of an axis does not matter; one without a direction turns nothing.
+static void lengths_of_axes(void **state)
+{
+    (void)state;
+    enum { ITEMS = 3 };
+    float axes[3 * ITEMS] = {0.36F, 360, 0, 0.48F, 480, 0, -0.8F, -800, 0}, in[64 * ITEMS], to[64 * ITEMS];
+    for (int i = 0; i < 64 * ITEMS; i++)
+        in[i] = cosf((float)(i / ITEMS));
+    alb_sh_to_axis_batch(to, in, 8, axes, ITEMS, ITEMS);
+    for (int i = 0; i < 64; i++) {
+        check_near((double)to[ITEMS * i], (double)to[ITEMS * i + 1], 2e-6 * sqrt(32)); // norm of 64 cosines
+        check_near((double)to[ITEMS * i + 2], (double)in[ITEMS * i], 2e-6 * sqrt(32));
+    }
+}
+
 static void quaternions(void **state)
 {
     (void)state;
@@ -221,8 +236,8 @@ static void batches_and_threads(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_rotation), cmocka_unit_test(composition),         cmocka_unit_test(axis_at_the_poles),
-        cmocka_unit_test(quaternions),  cmocka_unit_test(batches_and_threads),
+        cmocka_unit_test(any_rotation),    cmocka_unit_test(composition), cmocka_unit_test(axis_at_the_poles),
+        cmocka_unit_test(lengths_of_axes), cmocka_unit_test(quaternions), cmocka_unit_test(batches_and_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

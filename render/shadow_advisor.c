@@ -1,0 +1,141 @@
+// Vertices i = 1 .. n drawn at random, each with two independent halves of its rays, a and b; x what the fields gave:
+//     mean square error = mean of (x - a)(x - b),      as the rays' errors are independent and have no bias
+// Upper bound: the mean plus 2 standard errors of it over the vertices, then the root. What receives only is no
+// occluder for the rays either: the error stated is that of the fields, not of what the method leaves out (bounces,
+// shadows that such objects would cast).
+#include "render/shadow_advisor.h"
+#include "base/memory.h"
+#include "base/random.h"
+#include "render/shadow_rays.h"
+#include <stdlib.h>
+
+enum { VERTICES = 400, STRATA = 12 };
+
+typedef struct samples {
+    alb_vector points[VERTICES], normals[VERTICES];
+    float found[VERTICES][3], halves[2][VERTICES][3];
+} samples;
+
+// The faces of all that casts or emits, and what they send.
+static bool collect(alb_mesh *mesh, float (**radiance)[3], const alb_shadow_stage *stage, const alb_scene *scene,
+                    alb_error *error)
+{
+    const alb_mesh *all = &scene->mesh;
+    bool ok = (*radiance = alb_allocate(all->face_count, sizeof **radiance, error)) != NULL;
+    for (size_t v = 0; ok && v < all->vertex_count; v++)
+        ok = alb_mesh_add_vertex(mesh, all->vertices[v], error);
+    for (size_t f = 0; ok && f < all->face_count; f++) {
+        bool used = false;
+        for (size_t i = 0; i < stage->occluder_count + stage->light_count && !used; i++) {
+            const alb_object *object = &scene->objects[stage->objects[i]];
+            used = all->faces[f][0] >= object->first_vertex &&
+                   all->faces[f][0] - object->first_vertex < object->vertex_count;
+        }
+        const size_t count = mesh->face_count;
+        ok = !used || alb_mesh_add_face(mesh, all->faces[f][0], all->faces[f][1], all->faces[f][2], 0, error);
+        for (int c = 0; c < 3 && mesh->face_count > count; c++)
+            (*radiance)[count][c] = (float)(scene->surfaces[all->groups[f]].exitance[c] / M_PI);
+    }
+    return ok;
+}
+
+static bool emits(const alb_shadow_stage *stage, const alb_scene *scene, size_t vertex)
+{
+    for (size_t i = stage->occluder_count; i < stage->occluder_count + stage->light_count; i++) {
+        const alb_object *object = &scene->objects[stage->objects[i]];
+        if (vertex >= object->first_vertex && vertex - object->first_vertex < object->vertex_count)
+            return true;
+    }
+    return false;
+}
+
+// Vertices of what does not emit; those are seen by their own light alone.
+static void draw(samples *s, const alb_shadow_stage *stage, const alb_scene *scene, uint64_t seed)
+{
+    alb_random random = alb_random_at(seed, 0xad71, 0);
+    for (int n = 0; n < VERTICES; n++) {
+        size_t v = 0;
+        for (int tries = 0; tries < 100; tries++) {
+            v = (size_t)(alb_random_uniform(&random) * (double)scene->mesh.vertex_count);
+            if (!emits(stage, scene, v))
+                break;
+        }
+        s->points[n] = scene->mesh.vertices[v];
+        s->normals[n] = stage->normals[v];
+        for (int c = 0; c < 3; c++)
+            s->found[n][c] = stage->irradiance[v][c];
+    }
+}
+
+static void compare(double *percent, double *upper_percent, const samples *s)
+{
+    *percent = NAN;
+    double upper = NAN;
+    for (int c = 0; c < 3; c++) {
+        double mean = 0, square = 0, fourth = 0;
+        for (int n = 0; n < VERTICES; n++) {
+            const double a = (double)s->halves[0][n][c], b = (double)s->halves[1][n][c], x = (double)s->found[n][c];
+            mean += 0.5 * (a + b) / VERTICES;
+            square += (x - a) * (x - b) / VERTICES;
+            fourth += pow((x - a) * (x - b), 2) / VERTICES;
+        }
+        const double spread = sqrt(fmax(fourth - square * square, 0) / VERTICES);
+        if (!(mean > 0))
+            continue;
+        *percent = fmax(100 * sqrt(fmax(square, 0)) / mean, isnan(*percent) ? 0 : *percent);
+        upper = fmax(100 * sqrt(fmax(square + 2 * spread, 0)) / mean, isnan(upper) ? 0 : upper);
+    }
+    if (upper_percent)
+        *upper_percent = upper;
+}
+
+bool alb_shadow_error(double *percent, double *upper_percent, const alb_shadow_stage *stage, const alb_scene *scene,
+                      uint64_t seed, alb_error *error)
+{
+    alb_mesh mesh = {0};
+    alb_tracer tracer = {0};
+    float(*radiance)[3] = NULL;
+    samples *s = alb_allocate(1, sizeof *s, error);
+    const bool ok = s && collect(&mesh, &radiance, stage, scene, error) && alb_tracer_create(&tracer, &mesh, error);
+    if (ok) {
+        draw(s, stage, scene, seed);
+        for (int half = 0; half < 2; half++)
+            alb_shadow_cast(s->halves[half], &tracer, (const float(*)[3])radiance, scene->lights, scene->light_count,
+                            s->points, s->normals, VERTICES, STRATA, 256 * tracer.slack_mm, seed + (uint64_t)half);
+        compare(percent, upper_percent, s);
+    }
+    alb_tracer_free(&tracer);
+    alb_mesh_free(&mesh);
+    free(radiance);
+    free(s);
+    return ok;
+}
+
+bool alb_shadow_advise(alb_shadow_stage *stage, double *upper_percent, const alb_scene *scene, double wanted_percent,
+                       uint64_t seed, alb_error *error)
+{
+    static const struct {
+        int order, outer, inner, cells;
+    } ladder[] = {{4, 1, 0, 8}, {4, 2, 0, 8}, {4, 1, 2, 8}, {4, 2, 3, 8}, {6, 2, 3, 12}, {8, 3, 3, 16}};
+    double best = INFINITY, percent;
+    for (size_t k = 0; k < sizeof ladder / sizeof *ladder; k++) {
+        const bool paper = stage->paper;
+        alb_shadow_stage_free(stage);
+        stage->paper = paper;
+        stage->settings = alb_shadow_defaults;
+        stage->settings.order = ladder[k].order;
+        stage->settings.outer = ladder[k].outer;
+        stage->settings.inner = ladder[k].inner;
+        stage->settings.cells = ladder[k].cells;
+        if (!alb_shadow_stage_light(stage, scene, error) ||
+            !alb_shadow_error(&percent, upper_percent, stage, scene, seed, error))
+            return false;
+        if (*upper_percent <= wanted_percent)
+            return true;
+        best = fmin(best, *upper_percent);
+    }
+    return alb_fail(error, ALB_UNDECIDED,
+                    "shadow fields err by %.2g %% of the mean irradiance here, %g %% is wanted: lights or objects look "
+                    "small or are close to each other; render by radiosity",
+                    best, wanted_percent);
+}

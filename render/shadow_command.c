@@ -1,0 +1,164 @@
+// Each frame: scene in, fields sampled, vertices lit, picture out. Fields and the pictures' exposure are kept from
+// frame to frame, so that neither bounding spheres nor brightness flicker.
+#include "render/shadow_command.h"
+#include "base/command.h"
+#include "base/exr.h"
+#include "base/progress.h"
+#include "render/shadow_advisor.h"
+#include "render/shadow_picture.h"
+#include "render/view.h"
+#include <stdio.h>
+#include <string.h>
+
+typedef struct targets {
+    const char *scene, *picture, *png;
+} targets;
+
+typedef struct sequence {
+    targets to;
+    alb_shadow_stage stage;
+    double exposure, wanted_percent; // 0: none yet, none stated
+    double error_percent, upper_percent, small_share;
+    double sampling_s, light_s, view_s; // of all frames
+    int frames;
+} sequence;
+
+static bool name_frame(char picture[ALB_PATH_SIZE], char png[ALB_PATH_SIZE], const targets *to, int frame, int frames,
+                       alb_error *error)
+{
+    char beside[ALB_PATH_SIZE];
+    const size_t length = strlen(to->picture),
+                 stem = length >= 4 && !strcmp(to->picture + length - 4, ".exr") ? length - 4 : length;
+    if (snprintf(beside, sizeof beside, "%.*s.png", (int)stem, to->picture) >= ALB_PATH_SIZE)
+        return alb_fail(error, ALB_USAGE, "%s: the path is too long", to->picture);
+    const char *const second = to->png ? to->png : beside;
+    if (frames > 1 && (!strchr(to->picture, '#') || !strchr(second, '#')))
+        return alb_fail(error, ALB_USAGE, "%s is one file for %d frames; put #### where their numbers should stand",
+                        strchr(to->picture, '#') ? second : to->picture, frames);
+    return alb_scene_frame_name(picture, to->picture, frame, error) && alb_scene_frame_name(png, second, frame, error);
+}
+
+static bool check_targets(const targets *to, int frame, int frames, alb_error *error)
+{
+    char picture[ALB_PATH_SIZE], png[ALB_PATH_SIZE];
+    if (!name_frame(picture, png, to, frame, frames, error))
+        return false;
+    if (alb_file_same(picture, png) || alb_file_same(picture, to->scene) || alb_file_same(png, to->scene))
+        return alb_fail(error, ALB_USAGE, "%s is given for two files; give each its own", picture);
+    return alb_file_check_target(picture, error) && alb_file_check_target(png, error);
+}
+
+static bool write_frame(sequence *s, const alb_scene *scene, const alb_provenance *provenance, int frame,
+                        alb_error *error)
+{
+    char path[ALB_PATH_SIZE], png[ALB_PATH_SIZE];
+    alb_image picture = {0};
+    alb_json json;
+    double brightest;
+    alb_json_begin(&json, provenance);
+    alb_json_end_object(&json);
+    bool ok = (!json.text.failed || alb_fail(error, ALB_NO_MEMORY, "out of memory for the provenance")) &&
+              name_frame(path, png, &s->to, frame, scene->frames, error) &&
+              alb_shadow_view(&picture, &brightest, scene, &s->stage, error);
+    if (ok && !(s->exposure > 0))
+        ok = alb_view_exposure(&s->exposure, &picture, brightest, error);
+    ok = ok && alb_exr_write(&picture, json.text.bytes, path, error) &&
+         alb_image_write_png(&picture, s->exposure, png, error);
+    alb_json_free(&json);
+    alb_image_free(&picture);
+    return ok;
+}
+
+// The first frame's error is measured; it stands for the others, whose settings are the same.
+static bool light_first(sequence *s, const alb_scene *scene, alb_error *error)
+{
+    if (s->wanted_percent > 0) {
+        if (!alb_shadow_advise(&s->stage, &s->upper_percent, scene, s->wanted_percent, scene->seed, error))
+            return false;
+    } else if (!alb_shadow_stage_light(&s->stage, scene, error))
+        return false;
+    const alb_shadow_world world = alb_shadow_stage_world(&s->stage);
+    s->small_share = alb_shadow_small_lights(&world, scene->mesh.vertices, s->stage.normals, scene->mesh.vertex_count);
+    if (s->small_share > 0)
+        fprintf(stderr,
+                "render: from %.0f %% of the vertices a light is less than %d degrees in half-angle: its shadows are "
+                "blurred\n",
+                100 * s->small_share, ALB_SHADOW_SMALL_DEG);
+    return alb_shadow_error(&s->error_percent, &s->upper_percent, &s->stage, scene, scene->seed, error);
+}
+
+static bool render_frame(sequence *s, int frame, alb_error *error)
+{
+    alb_scene scene;
+    alb_provenance provenance = {.command = "render"};
+    if (!alb_scene_read_frame(&scene, &provenance, s->to.scene, frame, error))
+        return false;
+    snprintf(provenance.options, sizeof provenance.options,
+             "method shadow, frame %d of %d, error_percent %g, seed %llu", frame, scene.frames, s->wanted_percent,
+             (unsigned long long)scene.seed);
+    bool ok = check_targets(&s->to, frame, scene.frames, error);
+    ok = ok && (frame ? alb_shadow_stage_light(&s->stage, &scene, error) : light_first(s, &scene, error));
+    const double start_s = alb_clock_s();
+    ok = ok && write_frame(s, &scene, &provenance, frame, error);
+    s->view_s += alb_clock_s() - start_s;
+    s->sampling_s += s->stage.sampling_s;
+    s->light_s += s->stage.light_s;
+    s->frames = scene.frames;
+    alb_scene_free(&scene);
+    return ok;
+}
+
+static bool report(const sequence *s, bool as_json, alb_error *error)
+{
+    const alb_shadow_settings *settings = &s->stage.settings;
+    if (!as_json) {
+        printf(
+            "%s: %d frames, %zu vertices, %zu occluders, stated error %.2g %% (within %.2g %%), %.1f ms sampling and "
+            "%.1f ms lighting a frame\n",
+            s->to.picture, s->frames, s->stage.vertex_count, s->stage.occluder_count, s->error_percent,
+            s->upper_percent, 1e3 * s->sampling_s / s->frames, 1e3 * s->light_s / s->frames);
+        return true;
+    }
+    alb_json json;
+    alb_json_begin(&json, NULL);
+    alb_json_integer(&json, "frames", s->frames);
+    alb_json_integer(&json, "vertices", (long)s->stage.vertex_count);
+    alb_json_integer(&json, "occluders", (long)s->stage.occluder_count);
+    alb_json_integer(&json, "lights", (long)s->stage.light_count);
+    alb_json_integer(&json, "order", settings->order);
+    alb_json_integer(&json, "cells", settings->cells);
+    alb_json_integer(&json, "shells_outside", settings->outer);
+    alb_json_integer(&json, "shells_inside", settings->inner);
+    alb_json_number(&json, "stated_error_percent", s->error_percent);
+    alb_json_number(&json, "upper_error_percent", s->upper_percent);
+    alb_json_number(&json, "small_light_share", s->small_share);
+    alb_json_object(&json, "seconds");
+    alb_json_number(&json, "sampling", s->sampling_s);
+    alb_json_number(&json, "lighting", s->light_s);
+    alb_json_number(&json, "view", s->view_s);
+    alb_json_end_object(&json);
+    alb_json_number(&json, "png_exposure", s->exposure);
+    return alb_json_print(&json, error);
+}
+
+bool alb_shadow_render(const char *scene_path, const char *picture, const char *png, const char *mesh,
+                       const char *stated_percent, bool json, alb_error *error)
+{
+    sequence s = {.to = {scene_path, picture, png}, .stage = {.settings = alb_shadow_defaults}, .frames = 1};
+    alb_progress progress;
+    if (mesh)
+        return alb_fail(error, ALB_USAGE, "--mesh belongs to radiosity; the shadow method writes pictures alone");
+    if (stated_percent && !alb_option_number(&s.wanted_percent, "--error", stated_percent, 0.01, 1000, error))
+        return false;
+    alb_progress_begin(&progress, "frames", 1);
+    bool ok = true;
+    for (int frame = 0; ok && frame < s.frames; frame++) {
+        ok = render_frame(&s, frame, error);
+        progress.total = s.frames;
+        alb_progress_at(&progress, frame + 1);
+    }
+    alb_progress_end(&progress);
+    ok = ok && report(&s, json, error);
+    alb_shadow_stage_free(&s.stage);
+    return ok;
+}

@@ -1,0 +1,53 @@
+// A shadow field: what an object hides, or how it shines, around it. Sampled at the nodes of a grid on a sphere outside
+// the object and, if asked for, on shells inside its bounding sphere; each sample is a function on the sphere of
+// directions in the world's frame, as spherical harmonics (render/sh.h). Zhou et al. 2005; one radius and scaling
+// instead of many radii: Wang et al. 2006. Fields of different objects are independent.
+#pragma once
+#include "render/mesh.h"
+#include "render/sh.h"
+#include "render/shadow_grid.h"
+#include "render/shadow_sphere.h"
+#include "render/shadow_view.h"
+
+enum { ALB_SHADOW_INNER_MAX = 3, ALB_SHADOW_OUTER_MAX = 6 };
+
+typedef struct alb_shadow_settings {
+    int order;       // of the samples, 2 to ALB_SH_ORDER_MAX; receivers get order 4
+    int cells;       // of the grid, a side of a cube's face
+    int pixels;      // of a picture, a side
+    double distance; // of the first shell outside from the middle, in radii of the bounding sphere
+    int outer;       // shells outside, 1 to ALB_SHADOW_OUTER_MAX
+    int inner;       // shells inside, 0 to ALB_SHADOW_INNER_MAX; occlusion only
+    int rays;        // from each inner node
+    double cluster;  // vertices within about so many radii move as one in pictures from outside; 0: each for itself
+} alb_shadow_settings;
+// Order 4, 8 cells, 64 pixels, one shell at 1.1 radii, none inside, 512 rays, 0.04.
+extern const alb_shadow_settings alb_shadow_defaults;
+// The same with three shells: what a light shows of itself changes with the distance more than a silhouette does.
+extern const alb_shadow_settings alb_shadow_light_settings;
+// Radii of the inner shells, from outside inwards; those of the outer ones over the first one's.
+extern const double alb_shadow_inner_radii[ALB_SHADOW_INNER_MAX], alb_shadow_outer_ratios[ALB_SHADOW_OUTER_MAX];
+
+typedef struct alb_shadow_field {
+    alb_shadow_settings settings;
+    alb_shadow_sphere sphere;
+    int channels;                                              // 1: occlusion, 3: radiance
+    int shells;                                                // inner + outer
+    double radii[ALB_SHADOW_INNER_MAX + ALB_SHADOW_OUTER_MAX]; // in radii of the sphere, ascending
+    float *samples;                                            // [shell][node][channel][order^2]
+    size_t replaced; // inner nodes that lie inside the object: they hold what the shell outside them gives, scaled
+    struct alb_shadow_studio *studio; // what pictures are taken with
+} alb_shadow_field;
+
+// The mesh's faces are copied; vertices come with every sample. face_radiance: NULL for an occluder, or of each face of
+// a light. `name` is for messages, borrowed. ALB_BAD_DATA: settings out of bounds, no faces.
+bool alb_shadow_field_create(alb_shadow_field *field, const alb_shadow_settings *settings, const alb_mesh *mesh,
+                             const float (*face_radiance)[3], const char *name, alb_error *error);
+void alb_shadow_field_free(alb_shadow_field *field);
+// Takes the samples of the object as it is now: the created mesh with other vertices. Fails as
+// alb_shadow_sphere_follow does; the samples are then those of before.
+bool alb_shadow_field_sample(alb_shadow_field *field, const alb_vector *vertices, alb_error *error);
+size_t alb_shadow_field_bytes(const alb_shadow_field *field);
+
+// The samples of a shell interpolated at a direction from the middle: out[channel][order^2].
+void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction);

@@ -1,0 +1,36 @@
+// Irradiance of receivers from skies and lights with fields, in the soft shadows of occluders with fields.
+#pragma once
+#include "render/light.h"
+#include "render/shadow_field.h"
+#include "render/shadow_scaling.h"
+
+// An environment as spherical harmonics: radiance seen from the middle.
+typedef struct alb_shadow_sky {
+    int order; // 1 to ALB_SH_ORDER_MAX; 4 where it is infinitely far away
+    float radiance[3][ALB_SH_COUNT_MAX];
+    alb_vector centre_mm; // of the sphere on which it lies
+    double radius_mm;     // 0: infinitely far away
+} alb_shadow_sky;
+// Of an environment light. Where it has a radius more bands are kept: nearer to the wall more of them are seen.
+void alb_shadow_sky_create(alb_shadow_sky *sky, const alb_light *environment);
+
+enum { ALB_SHADOW_OCCLUDERS_MAX = 64 };
+
+// What lights and what hides; all borrowed.
+typedef struct alb_shadow_world {
+    const alb_shadow_field *occluders, *lights;
+    const alb_shadow_sky *skies;
+    size_t occluder_count, light_count, sky_count; // at most ALB_SHADOW_OCCLUDERS_MAX occluders
+    const alb_shadow_scaling *scaling;
+} alb_shadow_world;
+
+// irradiance[count][3] at points with unit normals: W/mm^2 where radiance is W/(mm^2 sr).
+// ALB_BAD_DATA: too many occluders, or a receiver on or beyond the sphere of a sky.
+bool alb_shadow_irradiance(float (*irradiance)[3], const alb_shadow_world *world, const alb_vector *points,
+                           const alb_vector *normals, size_t count, alb_error *error);
+
+// Of the receivers that face a light with a field, the share from which its bounding sphere is less than
+// ALB_SHADOW_SMALL_DEG in half-angle: order 4 then blurs its shadows (rms .14 of the irradiance).
+#define ALB_SHADOW_SMALL_DEG 20
+double alb_shadow_small_lights(const alb_shadow_world *world, const alb_vector *points, const alb_vector *normals,
+                               size_t count);

@@ -1,0 +1,14 @@
+// Irradiance by rays: what shadow fields approximate, and what they are measured against.
+#pragma once
+#include "render/light.h"
+#include "render/tracer.h"
+
+// irradiance[count][3] of points with unit normals, E = pi / N sum of the radiance that N rays meet, N the square of
+// `strata`, spread as the cosine over the hemisphere, one in each of strata^2 cells. The tracer's faces have
+// face_radiance seen from the front and are black from the back; skies are what no face hides. Rays start offset_mm
+// above the point. `seed` picks the random numbers; the error is random, without bias.
+void alb_shadow_cast(float (*irradiance)[3], const alb_tracer *tracer, const float (*face_radiance)[3],
+                     const alb_light *skies, size_t sky_count, const alb_vector *points, const alb_vector *normals,
+                     size_t count, int strata, double offset_mm, uint64_t seed);
+// Radiance of an environment seen from a point, also one of finite size.
+void alb_shadow_sky_radiance(double radiance[3], const alb_light *sky, alb_vector from, alb_vector direction);

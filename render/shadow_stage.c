@@ -1,0 +1,202 @@
+// Objects with a face that emits are lights; those that are said to receive only cast no shadow; all others are
+// occluders. Stops being true: lights hide nothing from each other or from the sky; what receives only hides nothing.
+#include "render/shadow_stage.h"
+#include "base/memory.h"
+#include "base/progress.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool owns(const alb_object *object, const uint32_t face[3])
+{
+    return face[0] >= object->first_vertex && face[0] - object->first_vertex < object->vertex_count;
+}
+
+static bool emits(const alb_scene *scene, size_t face)
+{
+    const double *e = scene->surfaces[scene->mesh.groups[face]].exitance;
+    return e[0] + e[1] + e[2] > 0;
+}
+
+// The faces of one object, and what they send.
+static bool cut_out(alb_mesh *mesh, float (**radiance)[3], const alb_scene *scene, const alb_object *object,
+                    alb_error *error)
+{
+    const alb_mesh *all = &scene->mesh;
+    bool ok = (*radiance = alb_allocate(all->face_count, sizeof **radiance, error)) != NULL;
+    for (size_t v = 0; ok && v < object->vertex_count; v++)
+        ok = alb_mesh_add_vertex(mesh, all->vertices[object->first_vertex + v], error);
+    for (size_t f = 0; ok && f < all->face_count; f++) {
+        if (!owns(object, all->faces[f]))
+            continue;
+        const size_t count = mesh->face_count;
+        uint32_t at[3];
+        for (int k = 0; k < 3; k++)
+            at[k] = all->faces[f][k] - (uint32_t)object->first_vertex;
+        ok = alb_mesh_add_face(mesh, at[0], at[1], at[2], 0, error);
+        for (int c = 0; c < 3 && mesh->face_count > count; c++)
+            (*radiance)[count][c] = (float)(scene->surfaces[all->groups[f]].exitance[c] / M_PI);
+    }
+    return ok;
+}
+
+static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o, bool light, alb_error *error)
+{
+    const size_t index = stage->occluder_count + stage->light_count;
+    alb_shadow_settings settings = stage->settings;
+    alb_mesh mesh = {0};
+    float(*radiance)[3] = NULL;
+    if (light)
+        settings = alb_shadow_light_settings;
+    stage->objects[index] = o;
+    snprintf(stage->names[index], sizeof *stage->names, "object %zu", o);
+    const bool ok = cut_out(&mesh, &radiance, scene, &scene->objects[o], error) &&
+                    alb_shadow_field_create(&stage->fields[index], &settings, &mesh,
+                                            light ? (const float(*)[3])radiance : NULL, stage->names[index], error);
+    *(light ? &stage->light_count : &stage->occluder_count) += ok;
+    free(radiance);
+    alb_mesh_free(&mesh);
+    return ok;
+}
+
+static bool find_lights(bool **shines, const alb_scene *scene, alb_error *error)
+{
+    if (!(*shines = alb_allocate(scene->object_count, sizeof **shines, error)))
+        return false;
+    for (size_t f = 0; f < scene->mesh.face_count; f++)
+        for (size_t o = 0; emits(scene, f) && o < scene->object_count; o++)
+            (*shines)[o] |= owns(&scene->objects[o], scene->mesh.faces[f]);
+    return true;
+}
+
+static void free_fields(alb_shadow_stage *stage)
+{
+    for (size_t i = 0; stage->fields && i < stage->occluder_count + stage->light_count; i++)
+        alb_shadow_field_free(&stage->fields[i]);
+    free(stage->fields);
+    free(stage->objects);
+    free(stage->names);
+    free(stage->faces);
+    free(stage->groups);
+    free(stage->normals);
+    free(stage->irradiance);
+    alb_shadow_scaling_free(&stage->scaling);
+    const alb_shadow_stage kept = *stage;
+    *stage = (alb_shadow_stage){
+        .settings = kept.settings, .paper = kept.paper, .skies = kept.skies, .sky_count = kept.sky_count};
+}
+
+void alb_shadow_stage_free(alb_shadow_stage *stage)
+{
+    free_fields(stage);
+    free(stage->skies);
+    *stage = (alb_shadow_stage){0};
+}
+
+static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
+{
+    const alb_mesh *mesh = &scene->mesh;
+    const size_t n = scene->object_count;
+    bool *shines = NULL;
+    bool ok = (stage->fields = alb_allocate(n, sizeof *stage->fields, error)) &&
+              (stage->objects = alb_allocate(n, sizeof *stage->objects, error)) &&
+              (stage->names = alb_allocate(n, sizeof *stage->names, error)) &&
+              (stage->faces = alb_allocate(mesh->face_count, sizeof *stage->faces, error)) &&
+              (stage->groups = alb_allocate(mesh->face_count, sizeof *stage->groups, error)) &&
+              (stage->normals = alb_allocate(mesh->vertex_count, sizeof *stage->normals, error)) &&
+              (stage->irradiance = alb_allocate(mesh->vertex_count, sizeof *stage->irradiance, error)) &&
+              find_lights(&shines, scene, error);
+    for (int light = 0; light < 2; light++) // occluders first
+        for (size_t o = 0; ok && o < n; o++)
+            if (shines[o] == (light == 1) && (light || !scene->objects[o].receives_only))
+                ok = add_field(stage, scene, o, light, error);
+    free(shines);
+    if (!ok)
+        return false;
+    memcpy(stage->faces, mesh->faces, mesh->face_count * sizeof *stage->faces);
+    memcpy(stage->groups, mesh->groups, mesh->face_count * sizeof *stage->groups);
+    stage->face_count = mesh->face_count;
+    stage->vertex_count = mesh->vertex_count;
+    return alb_shadow_scaling_create(&stage->scaling, stage->settings.order, stage->paper, error);
+}
+
+static bool still_fits(const alb_shadow_stage *stage, const alb_mesh *mesh)
+{
+    return stage->fields && stage->face_count == mesh->face_count && stage->vertex_count == mesh->vertex_count &&
+           !memcmp(stage->faces, mesh->faces, mesh->face_count * sizeof *stage->faces) &&
+           !memcmp(stage->groups, mesh->groups, mesh->face_count * sizeof *stage->groups);
+}
+
+static bool read_skies(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
+{
+    free(stage->skies);
+    stage->sky_count = 0;
+    if (!(stage->skies = alb_allocate(scene->light_count, sizeof *stage->skies, error)))
+        return false;
+    for (size_t i = 0; i < scene->light_count; i++) {
+        if (scene->lights[i].kind != ALB_LIGHT_ENVIRONMENT)
+            return alb_fail(
+                error, ALB_BAD_DATA,
+                "light %zu is a %s: it has no soft shadow, which is what shadow fields know; give it a size "
+                "as an object that emits, or render by radiosity",
+                i, alb_light_names[scene->lights[i].kind]);
+        alb_shadow_sky_create(&stage->skies[stage->sky_count++], &scene->lights[i]);
+    }
+    return true;
+}
+
+static void set_normals(alb_vector *normals, const alb_mesh *mesh)
+{
+    memset(normals, 0, mesh->vertex_count * sizeof *normals);
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        const uint32_t *v = mesh->faces[f];
+        const alb_vector a = mesh->vertices[v[0]],
+                         twice = alb_cross(alb_sub(mesh->vertices[v[1]], a), alb_sub(mesh->vertices[v[2]], a));
+        for (int k = 0; k < 3; k++)
+            normals[v[k]] = alb_add(normals[v[k]], twice);
+    }
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        normals[i] = alb_unit(normals[i]);
+        if (!(alb_dot(normals[i], normals[i]) > 0)) // no face, or faces back to back
+            normals[i] = (alb_vector){0, 0, 1};
+    }
+}
+
+alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage)
+{
+    return (alb_shadow_world){.occluders = stage->fields,
+                              .occluder_count = stage->occluder_count,
+                              .lights = stage->fields + stage->occluder_count,
+                              .light_count = stage->light_count,
+                              .skies = stage->skies,
+                              .sky_count = stage->sky_count,
+                              .scaling = &stage->scaling};
+}
+
+bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
+{
+    const double start_s = alb_clock_s();
+    const alb_mesh *mesh = &scene->mesh;
+    bool ok = read_skies(stage, scene, error);
+    if (ok && !still_fits(stage, mesh)) {
+        free_fields(stage);
+        ok = create_fields(stage, scene, error);
+    }
+    if (ok && !stage->light_count && !stage->sky_count)
+        ok = alb_fail(error, ALB_BAD_DATA, "there is no light: no environment and no object that emits");
+    for (size_t i = 0; ok && i < stage->occluder_count + stage->light_count; i++)
+        ok = alb_shadow_field_sample(&stage->fields[i], mesh->vertices + scene->objects[stage->objects[i]].first_vertex,
+                                     error);
+    const double sampled_s = alb_clock_s();
+    if (ok) {
+        const alb_shadow_world world = alb_shadow_stage_world(stage);
+        set_normals(stage->normals, mesh);
+        ok =
+            alb_shadow_irradiance(stage->irradiance, &world, mesh->vertices, stage->normals, mesh->vertex_count, error);
+    }
+    stage->sampling_s = sampled_s - start_s;
+    stage->light_s = alb_clock_s() - sampled_s;
+    if (!ok)
+        free_fields(stage);
+    return ok;
+}

@@ -1,0 +1,197 @@
+// A pixel is covered where its centre lies in a face; edges belong to the pixels on one side of them, so that faces
+// that share an edge leave no gap. With 64 pixels a row the cover of a picture is a word a row, and
+//     S_i = sum over rows and their covered runs [a, b) of  P[row][b][i] - P[row][a][i],   P = sums of the lens
+// A pixel's integral is the mean of 4 x 4 points times the solid angle dA / (1 + x^2 + y^2)^(3/2).
+// Stops being true for what is thinner than a pixel: it is seen where it meets a centre, right on average alone. With
+// y down, a front face (counter-clockwise to the eye) has a negative area.
+#include "render/shadow_view.h"
+#include "base/memory.h"
+#include "base/vector_clones.h"
+#include "render/sh.h"
+#include <stdlib.h>
+#include <string.h>
+
+bool alb_shadow_lens_create(alb_shadow_lens *lens, int pixels, int order, double distance, alb_error *error)
+{
+    enum { POINTS = 4 };
+    *lens = (alb_shadow_lens){.pixels = pixels, .values = order * order, .distance = distance};
+    if (!(distance >= ALB_SHADOW_NEAREST && distance <= 1e3) || pixels < 4 || pixels > ALB_SHADOW_PIXELS_MAX)
+        return alb_fail(error, ALB_BAD_DATA,
+                        "pictures of %d pixels from %g radii; 4 to %d from %g radii or farther are possible", pixels,
+                        distance, ALB_SHADOW_PIXELS_MAX, ALB_SHADOW_NEAREST);
+    lens->tangent = 1.001 / sqrt(distance * distance - 1); // roundings of corners on the sphere stay inside
+    const size_t values = (size_t)lens->values, row_values = (size_t)(pixels + 1) * values;
+    if (!(lens->sums = alb_allocate((size_t)pixels * row_values, sizeof *lens->sums, error)))
+        return false;
+    const double step = 2 * lens->tangent / pixels / POINTS;
+    for (int row = 0; row < pixels; row++) {
+        double sum[ALB_SH_COUNT_MAX] = {0}, basis[ALB_SH_COUNT_MAX];
+        for (int column = 0; column < pixels; column++) {
+            for (int k = 0; k < POINTS * POINTS; k++) {
+                const alb_vector to = {(column * POINTS + k % POINTS + 0.5) * step - lens->tangent,
+                                       (row * POINTS + k / POINTS + 0.5) * step - lens->tangent, 1};
+                const double length = alb_length(to);
+                alb_sh_evaluate(basis, order, alb_unit(to));
+                for (size_t i = 0; i < values; i++)
+                    sum[i] += basis[i] * step * step / (length * length * length);
+            }
+            for (size_t i = 0; i < values; i++)
+                lens->sums[(size_t)row * row_values + (size_t)(column + 1) * values + i] = (float)sum[i];
+        }
+    }
+    return true;
+}
+
+void alb_shadow_lens_free(alb_shadow_lens *lens)
+{
+    free(lens->sums);
+    *lens = (alb_shadow_lens){0};
+}
+
+ALB_VECTOR_CLONES
+void alb_shadow_project(alb_shadow_corners *out, const float *x, const float *y, const float *z,
+                        const double world_from_picture[3][3], const alb_shadow_lens *lens)
+{
+    float m[3][3];
+    for (int i = 0; i < 9; i++)
+        m[i % 3][i / 3] = (float)world_from_picture[i / 3][i % 3];
+    const float away = (float)lens->distance, middle = 0.5f * (float)lens->pixels,
+                scale = (float)(0.5 * lens->pixels / lens->tangent);
+    float *restrict px = out->x, *restrict py = out->y, *restrict depth = out->depth;
+    for (size_t i = 0; i < out->count; i++) {
+        const float forward = m[2][0] * x[i] + m[2][1] * y[i] + m[2][2] * z[i] + away, by = scale / forward;
+        px[i] = middle + by * (m[0][0] * x[i] + m[0][1] * y[i] + m[0][2] * z[i]);
+        py[i] = middle + by * (m[1][0] * x[i] + m[1][1] * y[i] + m[1][2] * z[i]);
+    }
+    if (depth)
+        for (size_t i = 0; i < out->count; i++)
+            depth[i] = m[2][0] * x[i] + m[2][1] * y[i] + m[2][2] * z[i] + away;
+}
+
+// The first pixel whose centre lies beyond the coordinate; coordinates are in 0..pixels up to rounding.
+static inline int first_beyond(float at) { return (int)(at + 0.5f); }
+
+typedef struct edge_point {
+    float x, y;
+} edge_point;
+
+static inline float least(float a, float b) { return a < b ? a : b; }
+static inline float most(float a, float b) { return a > b ? a : b; }
+
+// The run of covered pixels of each row of a triangle; count of rows from *first on.
+static inline int find_runs(int *first, int (*runs)[2], edge_point a, edge_point b, edge_point c)
+{
+    edge_point swap;
+    if (a.y > b.y)
+        swap = a, a = b, b = swap;
+    if (b.y > c.y)
+        swap = b, b = c, c = swap;
+    if (a.y > b.y)
+        swap = a, a = b, b = swap;
+    const int top = first_beyond(a.y), middle = first_beyond(b.y), bottom = first_beyond(c.y);
+    // each edge is followed from its upper end, by whichever face: the same bits for both that share it
+    const float along = top < bottom ? (c.x - a.x) / (c.y - a.y) : 0;
+    const float upper = top < middle ? (b.x - a.x) / (b.y - a.y) : 0;
+    const float lower = middle < bottom ? (c.x - b.x) / (c.y - b.y) : 0;
+    for (int row = top; row < bottom; row++) {
+        const float y = (float)row + 0.5f, one = a.x + (y - a.y) * along,
+                    other = row < middle ? a.x + (y - a.y) * upper : b.x + (y - b.y) * lower;
+        runs[row - top][0] = first_beyond(least(one, other));
+        runs[row - top][1] = first_beyond(most(one, other));
+    }
+    *first = top;
+    return bottom - top;
+}
+
+static inline uint64_t bits_below(int n) { return n >= 64 ? UINT64_MAX : ((uint64_t)1 << n) - 1; }
+
+void alb_shadow_view_occlusion(float *out, const alb_shadow_corners *at, const uint32_t (*faces)[3], size_t face_count,
+                               bool fronts_only, const alb_shadow_lens *lens)
+{
+    uint64_t cover[ALB_SHADOW_PIXELS_MAX + 1] = {0};
+    for (size_t f = 0; f < face_count; f++) {
+        const uint32_t *v = faces[f];
+        const edge_point a = {at->x[v[0]], at->y[v[0]]}, b = {at->x[v[1]], at->y[v[1]]}, c = {at->x[v[2]], at->y[v[2]]};
+        if (fronts_only && (b.x - a.x) * (c.y - a.y) >= (c.x - a.x) * (b.y - a.y))
+            continue;
+        if (first_beyond(least(a.x, least(b.x, c.x))) == first_beyond(most(a.x, most(b.x, c.x))) ||
+            first_beyond(least(a.y, least(b.y, c.y))) == first_beyond(most(a.y, most(b.y, c.y))))
+            continue; // most faces of a fine mesh lie between the centres
+        int first, runs[ALB_SHADOW_PIXELS_MAX + 1][2];
+        const int rows = find_runs(&first, runs, a, b, c);
+        for (int k = 0; k < rows; k++)
+            cover[first + k] |= bits_below(runs[k][1]) & ~bits_below(runs[k][0]);
+    }
+    const size_t values = (size_t)lens->values;
+    memset(out, 0, values * sizeof *out);
+    for (int row = 0; row < lens->pixels; row++)
+        for (uint64_t rest = cover[row]; rest;) {
+            const int start = __builtin_ctzll(rest),
+                      end = ~(rest >> start) ? start + __builtin_ctzll(~(rest >> start)) : 64;
+            const float *sums = lens->sums + (size_t)row * (size_t)(lens->pixels + 1) * values;
+            for (size_t i = 0; i < values; i++)
+                out[i] += sums[(size_t)end * values + i] - sums[(size_t)start * values + i];
+            rest &= ~bits_below(end);
+        }
+}
+
+// The depth of a face at pixel centres is a plane in 1 / depth.
+typedef struct plane {
+    float at_origin, along_x, along_y;
+} plane;
+
+static plane inverse_depth(edge_point a, edge_point b, edge_point c, const float depth[3], float area)
+{
+    const float da = 1 / depth[0], db = 1 / depth[1] - da, dc = 1 / depth[2] - da;
+    plane p;
+    p.along_x = (db * (c.y - a.y) - dc * (b.y - a.y)) / area;
+    p.along_y = (dc * (b.x - a.x) - db * (c.x - a.x)) / area;
+    p.at_origin = da - p.along_x * a.x - p.along_y * a.y;
+    return p;
+}
+
+static void draw(float *nearest, uint32_t *seen, const alb_shadow_corners *at, const uint32_t *v, uint32_t mark,
+                 int pixels)
+{
+    const edge_point a = {at->x[v[0]], at->y[v[0]]}, b = {at->x[v[1]], at->y[v[1]]}, c = {at->x[v[2]], at->y[v[2]]};
+    const float area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
+    const float depth[3] = {at->depth[v[0]], at->depth[v[1]], at->depth[v[2]]};
+    int first, runs[ALB_SHADOW_PIXELS_MAX + 1][2];
+    if (area == 0)
+        return;
+    const plane p = inverse_depth(a, b, c, depth, area);
+    const int rows = find_runs(&first, runs, a, b, c);
+    for (int k = 0; k < rows; k++)
+        for (int x = runs[k][0]; x < runs[k][1]; x++) {
+            const float inverse = p.at_origin + p.along_x * ((float)x + 0.5f) + p.along_y * ((float)(first + k) + 0.5f);
+            const int pixel = (first + k) * pixels + x;
+            if (inverse > nearest[pixel])
+                nearest[pixel] = inverse, seen[pixel] = area > 0 ? 0 : mark;
+        }
+}
+
+void alb_shadow_view_radiance(float *out, const alb_shadow_corners *corners, const uint32_t (*faces)[3],
+                              size_t face_count, const float (*face_radiance)[3], const alb_shadow_lens *lens,
+                              float *nearest, uint32_t *seen)
+{
+    const int pixels = lens->pixels;
+    const size_t values = (size_t)lens->values, all = (size_t)pixels * (size_t)pixels;
+    memset(nearest, 0, all * sizeof *nearest);
+    memset(seen, 0, all * sizeof *seen);
+    memset(out, 0, 3 * values * sizeof *out);
+    for (size_t f = 0; f < face_count; f++)
+        draw(nearest, seen, corners, faces[f], (uint32_t)f + 1, pixels);
+    for (int row = 0; row < pixels; row++)
+        for (int column = 0; column < pixels;) {
+            const uint32_t mark = seen[row * pixels + column];
+            const float *sums = lens->sums + ((size_t)row * (size_t)(pixels + 1) + (size_t)column) * values;
+            int run = 1;
+            while (column + run < pixels && seen[row * pixels + column + run] == mark)
+                run++;
+            for (int c = 0; mark && c < 3; c++)
+                for (size_t i = 0; i < values; i++)
+                    out[(size_t)c * values + i] +=
+                        face_radiance[mark - 1][c] * (sums[(size_t)run * values + i] - sums[i]);
+            column += run;
+        }
+}
