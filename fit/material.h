@@ -9,23 +9,26 @@ enum { ALB_PARAMETERS_MAX = 6 };
 
 typedef enum alb_form {
     ALB_FORM_NONE,
-    ALB_FORM_EXPONENTIAL,         // a1 e^(-b1 r)
-    ALB_FORM_TWO_EXPONENTIALS,    // a1 e^(-b1 r) + a2 e^(-b2 r), a > 0 (Sheng et al. 2014, sec. 6)
-    ALB_FORM_SIGNED_EXPONENTIALS, // the same with b1 < b2, a2 < 0, a1 + a2 >= 0: S >= 0 everywhere
-    ALB_FORM_THREE_EXPONENTIALS,  // three terms, a > 0, b1 < b2 < b3
-    ALB_FORM_DIPOLE,              // classic dipole of a half-space (Jensen et al. 2001)
-    ALB_FORM_TWO_OVER_R,          // (a1 e^(-b1 r) + a2 e^(-b2 r)) / r, a > 0, b1 < b2
-    ALB_FORM_BURLEY,              // A (e^(-r/d) + e^(-r/(3 d))) / (8 pi d r) (Christensen & Burley 2015)
-    ALB_FORM_BURIED_SOURCE,       // a e^(-b (rho - z)) / rho, rho^2 = r^2 + z^2, all > 0: flat at r = 0
-    ALB_FORM_BURIED_AND_OVER_R,   // one buried source and a2 e^(-b2 r) / r
-    ALB_FORM_TWO_BURIED_SOURCES,  // two of them, b1 < b2
-    ALB_FORM_BETTER_DIPOLE,       // of a half-space (d'Eon 2012), as diffusion.h
+    ALB_FORM_EXPONENTIAL,          // a1 e^(-b1 r)
+    ALB_FORM_TWO_EXPONENTIALS,     // a1 e^(-b1 r) + a2 e^(-b2 r), a > 0 (Sheng et al. 2014, sec. 6)
+    ALB_FORM_SIGNED_EXPONENTIALS,  // the same with b1 < b2, a2 < 0, a1 + a2 >= 0: S >= 0 everywhere
+    ALB_FORM_THREE_EXPONENTIALS,   // three terms, a > 0, b1 < b2 < b3
+    ALB_FORM_DIPOLE,               // classic dipole of a half-space (Jensen et al. 2001)
+    ALB_FORM_TWO_OVER_R,           // (a1 e^(-b1 r) + a2 e^(-b2 r)) / r, a > 0, b1 < b2
+    ALB_FORM_BURLEY,               // A (e^(-r/d) + e^(-r/(3 d))) / (8 pi d r) (Christensen & Burley 2015)
+    ALB_FORM_BURIED_SOURCE,        // a e^(-b (rho - z)) / rho, rho^2 = r^2 + z^2, all > 0: flat at r = 0
+    ALB_FORM_BURIED_AND_OVER_R,    // one buried source and a2 e^(-b2 r) / r
+    ALB_FORM_TWO_BURIED_SOURCES,   // two of them, b1 < b2
+    ALB_FORM_BETTER_DIPOLE,        // of a half-space (d'Eon 2012), as diffusion.h
+    ALB_FORM_MULTIPOLE_REFLECTION, // of a slab (Donner & Jensen 2005), as diffusion.h
+    ALB_FORM_MULTIPOLE_TRANSMISSION,
     ALB_FORMS
 } alb_form;
 
 // Parameters, in order: of sums of exponentials a1, b1, a2, b2, a3, b3 (amplitude_1_per_mm2, decay_1_per_mm, ...), over
 // r the same in amplitude_1_per_mm; of buried sources a1, b1, z1, a2, b2, z2 (depth_1_mm); of Burley's albedo (A) and
-// length_mm (d); of the dipoles absorption_per_mm, reduced_scattering_per_mm, refractive_index.
+// length_mm (d); of the dipoles absorption_per_mm, reduced_scattering_per_mm, refractive_index; of
+// the multipoles thickness_mm besides, more than a transport mean free path.
 typedef struct alb_profile {
     alb_form form;
     double parameters[ALB_PARAMETERS_MAX];

@@ -1,4 +1,4 @@
-// "materials" of SCENE.json: measured, a dipole, or opaque.
+// "materials" of SCENE.json: measured, a dipole, a multipole, or opaque.
 #include "base/memory.h"
 #include "render/scene_reader.h"
 #include <stdio.h>
@@ -47,22 +47,59 @@ static bool read_measured(alb_surface *surface, alb_scene_reader *in, alb_node n
     return true;
 }
 
+typedef struct medium {
+    double absorption[3], scattering[3], index;
+    alb_finish finish;
+} medium;
+
+#define MEDIUM_KEYS "absorption_per_mm reduced_scattering_per_mm refractive_index finish"
+
+static bool read_medium(medium *of, alb_node node, alb_error *error)
+{
+    return alb_node_numbers(of->absorption, 3, node, "absorption_per_mm", 1e-9, 1e4, error) &&
+           alb_node_numbers(of->scattering, 3, node, "reduced_scattering_per_mm", 1e-9, 1e4, error) &&
+           alb_node_number(&of->index, node, "refractive_index", 1, 3, error) &&
+           alb_finish_read(&of->finish, node, error);
+}
+
 static bool read_dipole(alb_surface *surface, alb_node node, alb_error *error)
 {
     alb_node dipole;
-    double absorption[3], scattering[3], index;
-    alb_finish finish;
+    medium of;
     if (!alb_node_allow(node, "dipole", error) || !alb_node_object(&dipole, node, "dipole", error) ||
-        !alb_node_allow(dipole, "absorption_per_mm reduced_scattering_per_mm refractive_index finish", error) ||
-        !alb_node_numbers(absorption, 3, dipole, "absorption_per_mm", 1e-9, 1e4, error) ||
-        !alb_node_numbers(scattering, 3, dipole, "reduced_scattering_per_mm", 1e-9, 1e4, error) ||
-        !alb_node_number(&index, dipole, "refractive_index", 1, 3, error) || !alb_finish_read(&finish, dipole, error))
+        !alb_node_allow(dipole, MEDIUM_KEYS, error) || !read_medium(&of, dipole, error))
         return false;
     surface->scatters = true;
-    surface->exits[ALB_REFLECTION] = alb_exit_of(ALB_REFLECTION, finish, index);
+    surface->exits[ALB_REFLECTION] = alb_exit_of(ALB_REFLECTION, of.finish, of.index);
     for (int c = 0; c < 3; c++)
         surface->profiles[ALB_REFLECTION][c] =
-            (alb_profile){.form = ALB_FORM_DIPOLE, .parameters = {absorption[c], scattering[c], index}};
+            (alb_profile){.form = ALB_FORM_DIPOLE, .parameters = {of.absorption[c], of.scattering[c], of.index}};
+    return true;
+}
+
+static bool read_multipole(alb_surface *surface, alb_node node, alb_error *error)
+{
+    static const alb_form forms[ALB_SIDES] = {ALB_FORM_MULTIPOLE_REFLECTION, ALB_FORM_MULTIPOLE_TRANSMISSION};
+    alb_node multipole;
+    medium of;
+    if (!alb_node_allow(node, "multipole", error) || !alb_node_object(&multipole, node, "multipole", error) ||
+        !alb_node_allow(multipole, MEDIUM_KEYS " thickness_mm", error) || !read_medium(&of, multipole, error) ||
+        !alb_node_number(&surface->thickness_mm, multipole, "thickness_mm", 1e-6, 1e6, error))
+        return false;
+    surface->scatters = surface->slab = true;
+    for (int side = 0; side < ALB_SIDES; side++) {
+        surface->exits[side] = alb_exit_of((alb_side)side, of.finish, of.index);
+        for (int c = 0; c < 3; c++)
+            surface->profiles[side][c] =
+                (alb_profile){.form = forms[side],
+                              .parameters = {of.absorption[c], of.scattering[c], of.index, surface->thickness_mm}};
+    }
+    for (int c = 0; c < 3; c++)
+        if (surface->thickness_mm * (of.absorption[c] + of.scattering[c]) <= 1)
+            return alb_node_fail(error, multipole, "thickness_mm",
+                                 "%g mm is thinner than a transport mean free path, %.3g mm in channel %c: light does "
+                                 "not diffuse there",
+                                 surface->thickness_mm, 1 / (of.absorption[c] + of.scattering[c]), "RGB"[c]);
     return true;
 }
 
@@ -72,6 +109,8 @@ static bool read_surface(alb_surface *surface, alb_scene_reader *in, alb_node no
         return read_measured(surface, in, node);
     if (alb_node_has(node, "dipole"))
         return read_dipole(surface, node, in->error);
+    if (alb_node_has(node, "multipole"))
+        return read_multipole(surface, node, in->error);
     return alb_node_allow(node, "reflectance exitance", in->error) &&
            alb_node_numbers(surface->reflectance, 3, node, "reflectance", 0, 1, in->error) &&
            (!alb_node_has(node, "exitance") ||

@@ -1,5 +1,6 @@
-// Blocks of eight receivers: each takes its two rows of the table and interpolates them, eight values at a time; eight
-// such vectors are turned over so that a vector holds one value of all eight; then the sparse product, eight wide.
+// Blocks of eight receivers: each takes its cell of the table, the values at its start and their rise, adds them up,
+// eight values at a time; eight such vectors are turned over so that a vector holds one value of all eight; then the
+// sparse product, eight wide.
 #include "render/sh_scale_batch.h"
 #include "base/memory.h"
 #include "base/vector_clones.h"
@@ -8,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LANES = 8, PADDED_MAX = 208 }; // order 8: 204
+enum { LANES = 8, BLOCKS = 8, PADDED_MAX = 208 }; // order 8: 204
 typedef float eight __attribute__((vector_size(LANES * sizeof(float))));
 typedef int32_t eight_bits __attribute__((vector_size(LANES * sizeof(int32_t))));
 #define INLINE static inline __attribute__((always_inline))
@@ -18,6 +19,16 @@ static bool falls(const alb_sh_law *law)
     return law->kind == ALB_SH_LAW_LIGHT || law->kind == ALB_SH_LAW_OCCLUSION || law->kind == ALB_SH_LAW_REGRESSED;
 }
 
+// The value at knot i: the start of cell i, and the end of the cell before it.
+static void store(alb_sh_batch *batch, int i, int v, float value)
+{
+    float *cell = batch->rows + (size_t)(2 * i * batch->padded + v);
+    if (i > 0)
+        cell[-batch->padded] = value - cell[-2 * batch->padded];
+    if (i < batch->cells)
+        *cell = value;
+}
+
 bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, alb_error *error)
 {
     const int count = alb_sh_scaling_count(law->order_out, law->order_in);
@@ -25,7 +36,7 @@ bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, 
     if (cells < 8 || cells > 4096 || cells % 2 || law->order_out > ALB_SH_ORDER_MAX || law->order_in > ALB_SH_ORDER_MAX)
         return alb_fail(error, ALB_USAGE, "batch of %d cells, order %d to %d; expected 8 to 4096, even, order 1 to %d",
                         cells, law->order_in, law->order_out, ALB_SH_ORDER_MAX);
-    batch->rows = alb_allocate((size_t)(cells + 1) * (size_t)batch->padded, sizeof *batch->rows, error);
+    batch->rows = alb_allocate((size_t)(2 * cells) * (size_t)batch->padded, sizeof *batch->rows, error);
     bool ok = batch->rows != NULL;
     for (int i = 0; i <= cells && ok; i++) {
         const double u = 2. * i / cells - 1;
@@ -34,7 +45,7 @@ bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, 
         alb_sh_scaling m;
         ok = alb_sh_law_at(&m, law, k, error);
         for (int v = 0; v < count && ok; v++)
-            batch->rows[(size_t)(i * batch->padded + v)] = (float)(m.value[v] * (falls(law) && k > 1 ? k * k : 1));
+            store(batch, i, v, (float)(m.value[v] * (falls(law) && k > 1 ? k * k : 1)));
     }
     if (!ok)
         alb_sh_batch_free(batch);
@@ -102,16 +113,16 @@ INLINE void interpolate(eight *m, const alb_sh_batch *batch, const places *p, in
 {
     const float *rows[LANES];
     for (int r = 0; r < LANES; r++)
-        rows[r] = batch->rows + (size_t)p->cell[r] * (size_t)padded;
+        rows[r] = batch->rows + (size_t)p->cell[r] * 2 * (size_t)padded;
 #pragma GCC unroll 4
     for (int v = 0; v < padded; v += LANES) {
         eight row[LANES];
 #pragma GCC unroll 8
         for (int r = 0; r < LANES; r++) {
-            eight low, high;
+            eight low, rise;
             memcpy(&low, rows[r] + v, sizeof low);
-            memcpy(&high, rows[r] + padded + v, sizeof high);
-            row[r] = low + p->share[r] * (high - low);
+            memcpy(&rise, rows[r] + padded + v, sizeof rise);
+            row[r] = low + p->share[r] * rise;
         }
         turn_over(m + v, row);
     }
@@ -161,14 +172,18 @@ INLINE void apply_block(float *out, const eight *m, const eight *factor, const f
 INLINE void apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride, size_t count,
                   int order_out, int order_in, int padded)
 {
-    for (size_t r = 0; r < count; r += LANES) {
-        const size_t items = count - r < LANES ? count - r : LANES;
-        eight m[PADDED_MAX], ratio = {0};
-        places p;
-        memcpy(&ratio, k + r, items * sizeof *k);
-        find_places(&p, batch, &ratio);
-        interpolate(m, batch, &p, padded);
-        apply_block(out + r, m, &p.factor, in + r, stride, items, order_out, order_in);
+    for (size_t first = 0; first < count; first += BLOCKS * LANES) {
+        const size_t left = count - first < BLOCKS * LANES ? count - first : BLOCKS * LANES;
+        eight m[PADDED_MAX], ratios[BLOCKS] = {{0}};
+        places p[BLOCKS];
+        memcpy(ratios, k + first, left * sizeof *k);
+        for (int b = 0; b < BLOCKS; b++)
+            find_places(&p[b], batch, &ratios[b]);
+        for (size_t r = 0; r < left; r += LANES) {
+            interpolate(m, batch, &p[r / LANES], padded);
+            apply_block(out + first + r, m, &p[r / LANES].factor, in + first + r, stride, left - r, order_out,
+                        order_in);
+        }
     }
 }
 

@@ -8,7 +8,7 @@ typedef struct alb_sh_batch {
     alb_sh_law law;
     int cells;   // intervals of u in [-1, 1]
     int padded;  // values a row, a multiple of 8
-    float *rows; // [cells + 1][padded]
+    float *rows; // [cells][2][padded]: the values at a cell's start, and their rise over it
 } alb_sh_batch;
 
 // cells: even, from 8 to 4096; 256 give an error of 2e-4 in M for the cone map of order 4, a quarter of it for twice as
