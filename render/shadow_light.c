@@ -85,7 +85,7 @@ static void add_scaled(float *out, const view *v, const alb_shadow_field *field,
             samples[i * BLOCK + r] = one[i];
     }
     alb_sh_to_axis_batch(samples, samples, field->settings.order, v->axes, BLOCK, count);
-    alb_sh_batch_apply(scaled, law, v->k, samples, BLOCK, count);
+    alb_sh_batch_apply(scaled, law, false, v->k, samples, BLOCK, count);
     for (size_t i = 0; i < VALUES; i++)
         for (size_t r = 0; r < count; r++)
             out[i * BLOCK + r] += v->weights[r] * scaled[i * BLOCK + r];
@@ -209,27 +209,27 @@ static void find_transfer(float *out, const block *b, const alb_shadow_world *wo
     }
 }
 
-// What a shell of a light gives through the transfer, both in the axis' frame. The mean radiance and the flux along the
-// axis go as k^-2 as they are, of M E the rest is taken: its own flux is up to 10 % off between shells.
+// What a shell of a light gives through the transfer P, in the axis' frame: P M S = (M^T P) S, scaled once for three
+// colours. The mean radiance and the flux along the axis go as k^-2 as they are, of M S the rest is taken: its own flux
+// is up to 10 % off between shells.
 static void add_shell(float (*sum)[3], const float *transfer, const view *v, const alb_shadow_field *light, int shell,
                       const alb_sh_batch *law, size_t count)
 {
-    float sample[3 * VALUES], samples[3][VALUES * BLOCK], scaled[VALUES * BLOCK];
+    float rest[VALUES * BLOCK], weights[VALUES * BLOCK], sample[3 * VALUES];
+    memcpy(rest, transfer, sizeof rest);
+    memset(rest, 0, BLOCK * sizeof *rest);
+    memset(rest + 2 * BLOCK, 0, BLOCK * sizeof *rest);
+    alb_sh_batch_apply(weights, law, true, v->k, rest, BLOCK, count);
+    for (size_t r = 0; r < count; r++) {
+        weights[r] += transfer[r] / (v->k[r] * v->k[r]);
+        weights[2 * BLOCK + r] += transfer[2 * BLOCK + r] / (v->k[r] * v->k[r]);
+    }
+    alb_sh_from_axis_batch(weights, weights, ORDER, v->axes, BLOCK, count);
     for (size_t r = 0; r < count; r++) {
         alb_shadow_field_at(sample, light, shell, v->directions[r]);
-        for (size_t i = 0; i < 3 * VALUES; i++)
-            samples[i / VALUES][i % VALUES * BLOCK + r] = sample[i];
-    }
-    for (int c = 0; c < 3; c++) {
-        alb_sh_to_axis_batch(samples[c], samples[c], ORDER, v->axes, BLOCK, count);
-        alb_sh_batch_apply(scaled, law, v->k, samples[c], BLOCK, count);
-        for (size_t r = 0; r < count; r++) { // the flux, which falls off as that of any light
-            scaled[r] = samples[c][r] / (v->k[r] * v->k[r]);
-            scaled[2 * BLOCK + r] = samples[c][2 * BLOCK + r] / (v->k[r] * v->k[r]);
-        }
         for (size_t i = 0; i < VALUES; i++)
-            for (size_t r = 0; r < count; r++)
-                sum[r][c] += v->weights[r] * transfer[i * BLOCK + r] * scaled[i * BLOCK + r];
+            for (size_t c = 0; c < 3; c++)
+                sum[r][c] += v->weights[r] * weights[i * BLOCK + r] * sample[c * VALUES + i];
     }
 }
 
@@ -250,39 +250,36 @@ static void add_light(float (*irradiance)[3], const block *b, const alb_shadow_w
             irradiance[r][c] += sum[r][c] > 0 ? sum[r][c] : 0;
 }
 
-// Radiance of channel c of a sky of finite size, in the frame of the axis from its centre to the receiver.
-static void see_sky(float *out, const alb_shadow_sky *sky, int c, const float *axes, const float *k,
-                    const alb_sh_batch *law, size_t count)
+// The transfer as weights of what is seen from the sky's centre.
+static void move_to_centre(float *out, float *transfer, const block *b, const alb_shadow_sky *sky,
+                           const alb_sh_batch *law)
 {
-    float seen[ALB_SH_COUNT_MAX * BLOCK];
-    for (size_t i = 0; i < ALB_SH_COUNT_MAX; i++)
-        for (size_t r = 0; r < count; r++)
-            seen[i * BLOCK + r] = sky->radiance[c][i];
-    alb_sh_to_axis_batch(seen, seen, ALB_SH_ORDER_MAX, axes, BLOCK, count);
-    alb_sh_batch_apply(out, law, k, seen, BLOCK, count);
+    float axes[3 * BLOCK], k[BLOCK];
+    for (size_t r = 0; r < b->count; r++) {
+        const alb_vector off = alb_sub(b->points[r], sky->centre_mm);
+        const double distance = alb_length(off);
+        const alb_vector d = distance > 0 ? alb_times(1 / distance, off) : (alb_vector){0, 0, 1};
+        axes[r] = (float)d.x, axes[BLOCK + r] = (float)d.y, axes[2 * BLOCK + r] = (float)d.z;
+        k[r] = (float)(distance / sky->radius_mm);
+    }
+    alb_sh_to_axis_batch(transfer, transfer, ORDER, axes, BLOCK, b->count);
+    alb_sh_batch_apply(out, law, true, k, transfer, BLOCK, b->count);
+    alb_sh_from_axis_batch(out, out, ALB_SH_ORDER_MAX, axes, BLOCK, b->count);
 }
 
 static void add_sky(float (*irradiance)[3], const block *b, const alb_shadow_world *world, const alb_shadow_sky *sky)
 {
-    float transfer[VALUES * BLOCK], seen[VALUES * BLOCK], axes[3 * BLOCK], k[BLOCK], sum[BLOCK];
+    float transfer[VALUES * BLOCK], weights[ALB_SH_COUNT_MAX * BLOCK];
     find_transfer(transfer, b, world, NULL, NULL);
-    if (sky->radius_mm > 0) {
-        for (size_t r = 0; r < b->count; r++) {
-            const alb_vector off = alb_sub(b->points[r], sky->centre_mm);
-            const double distance = alb_length(off);
-            const alb_vector d = distance > 0 ? alb_times(1 / distance, off) : (alb_vector){0, 0, 1};
-            axes[r] = (float)d.x, axes[BLOCK + r] = (float)d.y, axes[2 * BLOCK + r] = (float)d.z;
-            k[r] = (float)(distance / sky->radius_mm);
-        }
-        alb_sh_to_axis_batch(transfer, transfer, ORDER, axes, BLOCK, b->count);
-    }
+    const bool finite = sky->radius_mm > 0;
+    if (finite)
+        move_to_centre(weights, transfer, b, sky, &world->laws->sky);
+    const float *from = finite ? weights : transfer;
     for (int c = 0; c < 3; c++) {
-        memset(sum, 0, sizeof sum);
-        if (sky->radius_mm > 0)
-            see_sky(seen, sky, c, axes, k, &world->laws->sky, b->count);
-        for (size_t i = 0; i < VALUES; i++)
+        float sum[BLOCK] = {0};
+        for (int i = 0; i < sky->order * sky->order; i++)
             for (size_t r = 0; r < b->count; r++)
-                sum[r] += transfer[i * BLOCK + r] * (sky->radius_mm > 0 ? seen[i * BLOCK + r] : sky->radiance[c][i]);
+                sum[r] += from[(size_t)i * BLOCK + r] * sky->radiance[c][i];
         for (size_t r = 0; r < b->count; r++)
             irradiance[r][c] += sum[r] > 0 ? sum[r] : 0;
     }
