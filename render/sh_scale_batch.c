@@ -139,7 +139,8 @@ INLINE void multiply(float *out, size_t out_stride, const eight *value, const fl
             eight plus = {0}, minus = {0};
 #pragma GCC unroll 8
             for (int j = m; j < columns; j++) {
-                const eight *own = value + (l - m) * (columns - m) + j - m;
+                const eight *own =
+                    value + (transposed ? (j - m) * (rows - m) + l - m : (l - m) * (columns - m) + j - m);
                 eight from;
                 memcpy(&from, in + (size_t)(j * (j + 1) + m) * in_stride, sizeof from);
                 plus += *own * from;
