@@ -1,6 +1,6 @@
-// Between two shells both speak: the outer one by t^2, t the place between them in the logarithm of the distance, as
-// scaling outwards is the more accurate. Further out or in, the last one alone. Weights and k are continuous, so that
-// nothing pops where a receiver crosses a shell or the bounding sphere.
+// Between two shells both speak: the outer one by t^2 (3 - 2 t), t the place between them in the logarithm of the
+// distance. Further out or in, the last one alone. Weights and k are continuous, so that nothing pops where a receiver
+// crosses a shell or the bounding sphere.
 #include "render/shadow_receivers.h"
 #include "render/sh_rotate.h"
 #include <string.h>
@@ -32,11 +32,13 @@ bool alb_shadow_receivers_weigh(alb_shadow_receivers *receivers, const alb_shado
         const double x = receivers->distances_mm[r] / field->sphere.radius_mm;
         double weight = 1;
         if (x < here && shell > 0) {
-            const double t = x <= inner ? 0 : log(x / inner) / log(here / inner);
-            weight = t * t;
+            double t = x <= inner ? 0 : log(x / inner) / log(here / inner);
+            t = t * t * (3 - 2 * t);
+            weight = t;
         } else if (x > here && outer > 0) {
-            const double t = x >= outer ? 1 : log(x / here) / log(outer / here);
-            weight = 1 - t * t;
+            double t = x >= outer ? 1 : log(x / here) / log(outer / here);
+            t = t * t * (3 - 2 * t);
+            weight = 1 - t;
         }
         receivers->weights[r] = (float)weight;
         receivers->k[r] = (float)(x / here);
