@@ -206,7 +206,10 @@ static bool run(int argc, char **argv, alb_error *error)
         return alb_fail(error, ALB_USAGE, "--method %s: there are radiosity and shadow", method);
     if (!check_targets(&out, error) || !alb_scene_read(&scene, &provenance, out.scene, error))
         return false;
-    const bool given = !stated || alb_option_number(&scene.error_percent, "--error", stated, 0.01, 100, error);
+    double percent = 0;
+    const bool given = !stated || alb_option_number(&percent, "--error", stated, 0.01, 100, error);
+    if (given && stated)
+        alb_scene_ask_error(&scene, percent);
     snprintf(provenance.options, sizeof provenance.options,
              "rays_per_patch %d, error_percent %g, residual %g, seed %llu", scene.rays_per_patch, scene.error_percent,
              scene.residual, (unsigned long long)scene.seed);

@@ -139,8 +139,12 @@ bool alb_form_factors_create_within(alb_form_factors *factors, const alb_patches
                                     int rays, uint64_t seed, alb_sampling sampling, size_t memory_bytes,
                                     alb_error *error)
 {
-    *factors = (alb_form_factors){
-        .patch_count = patches->count, .rays = rays, .seed = seed, .sampling = sampling, .memory_bytes = memory_bytes};
+    *factors = (alb_form_factors){.patch_count = patches->count,
+                                  .areas_mm2 = patches->areas_mm2,
+                                  .rays = rays,
+                                  .seed = seed,
+                                  .sampling = sampling,
+                                  .memory_bytes = memory_bytes};
     return build_even(factors, &(source){.patches = patches, .tracer = tracer}, error);
 }
 
@@ -161,6 +165,7 @@ bool alb_form_factors_cast_again(alb_form_factors *factors, const alb_patches *p
                                  const uint32_t *lengths, alb_error *error)
 {
     alb_form_factors again = {.patch_count = factors->patch_count,
+                              .areas_mm2 = factors->areas_mm2,
                               .rays = factors->rays,
                               .seed = factors->seed,
                               .sampling = factors->sampling,

@@ -7,7 +7,8 @@ enum { ALB_RAYS_MAX = 1 << 16 }; // a patch
 
 typedef struct alb_form_factors {
     size_t patch_count;
-    int rays; // a patch, where a stated error has not asked for more
+    const double *areas_mm2; // borrowed; NULL: of lists made elsewhere, all patches alike
+    int rays;                // a patch, where a stated error has not asked for more
     uint64_t seed;
     alb_sampling sampling;
     size_t memory_bytes; // hits beyond it lie in a file; 0: no limit
@@ -57,8 +58,9 @@ void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, c
 // error of F radiosity, or a little above it. sky (may be NULL) is the sky's even radiosity, pi times its radiance.
 void alb_form_factors_half_difference(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3],
                                       const double sky[3]);
-// rms error over the patches in percent of the rms irradiance, the worst channel, as a bound that holds in 95 % of
-// draws of the rays; 0 where all is black. NAN where a patch has a single ray and so no halves.
+// rms error over the patches in percent of the rms irradiance, the worst channel and the worse of two means, of the
+// patches and over their area, as a bound that holds in 95 % of draws of the rays; 0 where all is black. NAN where a
+// patch has a single ray and so no halves.
 bool alb_form_factors_error(double *percent, const alb_form_factors *factors, const double (*radiosity)[3],
                             const double sky[3], alb_error *error);
 // Casts rows again with as many rays as bring that error to `percent`, for light like `radiosity` (a first solution),

@@ -1,7 +1,8 @@
 // The error of ray-cast rows, from their halves. With I_e, I_o what the even and the odd rays of a patch gather,
 //     I = (I_e + I_o)/2,   half difference d = (I_e - I_o)/2,   stated error^2 = upper bound of mean d^2 / mean I^2
-// over the patches. For random rays E d^2 is the variance of I. A lattice's halves are lattices of R/2, each of which
-// errs 2^a times as much as the whole, a from 1/2 to 1: d then says up to 1.4 too much, on fine meshes 1.3 to 1.6.
+// over the patches, and again over their area (large patches may err more, and send more): the worse is stated. For
+// random rays E d^2 is the variance of I. A lattice's halves are lattices of R/2, each of which errs 2^a times as much
+// as the whole, a from 1/2 to 1: d then says up to 1.4 too much, on fine meshes 1.3 to 1.6.
 //
 // Refining: with s_p^2 the mean d^2 of 33 patches along a Morton curve around p (one patch's d is one draw, and rays
 // may have missed a small lamp altogether), (1 + g) times as many rays for p take s_p^2 (1 - (1+g)^(-2a)) off the sum
@@ -13,6 +14,7 @@
 #include "base/memory.h"
 #include "render/form_factor.h"
 #include <stdlib.h>
+#include <string.h>
 
 enum { WINDOW = 16, ROUNDS = 3, STEPS = 60 };
 
@@ -22,32 +24,61 @@ static const double margin = 0.95;   // aimed at, of what is asked
 
 typedef double rgb[3];
 
-// Mean square of each channel of the irradiance, the sky's share with it.
-static void mean_squares(double out[3], const rgb *irradiance, const alb_form_factors *factors, const double sky[3])
+// What a patch counts in a mean: one, or its area in units of the mean area.
+enum { BY_PATCH, BY_AREA, WAYS };
+
+static double weight(const alb_form_factors *factors, size_t patch, int way, double mean_mm2)
 {
-    out[0] = out[1] = out[2] = 0;
+    return way == BY_AREA && factors->areas_mm2 ? factors->areas_mm2[patch] / mean_mm2 : 1;
+}
+
+static double mean_area(const alb_form_factors *factors)
+{
+    double sum = 0;
+    for (size_t p = 0; factors->areas_mm2 && p < factors->patch_count; p++)
+        sum += factors->areas_mm2[p];
+    return sum / (double)factors->patch_count;
+}
+
+// Mean square of each channel of the irradiance, the sky's share with it.
+static void mean_squares(double out[WAYS][3], const rgb *irradiance, const alb_form_factors *factors,
+                         const double sky[3], double mean_mm2)
+{
+    memset(out, 0, WAYS * sizeof *out);
     for (size_t p = 0; p < factors->patch_count; p++)
         for (int c = 0; c < 3; c++) {
             const double all = irradiance[p][c] + (sky ? sky[c] * (double)factors->sky_shares[p] : 0);
-            out[c] += all * all / (double)factors->patch_count;
+            for (int way = 0; way < WAYS; way++)
+                out[way][c] += weight(factors, p, way, mean_mm2) * all * all / (double)factors->patch_count;
         }
 }
 
-// squares[p][c] = d^2 / mean I^2, zero in a channel that is black.
+// squares[p][c] = w d^2 / mean w I^2, w 1 or the area, of the two ways the one whose sum is larger; zero in a channel
+// that is black.
 static bool relative_squares(rgb *squares, const alb_form_factors *factors, const rgb *radiosity, const double sky[3],
                              alb_error *error)
 {
-    double mean[3];
+    double mean[WAYS][3], sums[WAYS][3] = {{0}};
+    const double mean_mm2 = mean_area(factors);
     rgb *irradiance = alb_allocate(factors->patch_count, sizeof *irradiance, error);
     if (!irradiance)
         return false;
     alb_form_factors_apply(irradiance, factors, radiosity);
-    mean_squares(mean, (const rgb *)irradiance, factors, sky);
+    mean_squares(mean, (const rgb *)irradiance, factors, sky, mean_mm2);
     free(irradiance);
     alb_form_factors_half_difference(squares, factors, radiosity, sky);
     for (size_t p = 0; p < factors->patch_count; p++)
-        for (int c = 0; c < 3; c++)
-            squares[p][c] = mean[c] > 0 ? squares[p][c] * squares[p][c] / mean[c] : 0;
+        for (int c = 0; c < 3; c++) {
+            squares[p][c] *= squares[p][c];
+            for (int way = 0; way < WAYS; way++)
+                sums[way][c] += weight(factors, p, way, mean_mm2) * squares[p][c];
+        }
+    for (int c = 0; c < 3; c++) {
+        const int way =
+            sums[BY_AREA][c] * mean[BY_PATCH][c] > sums[BY_PATCH][c] * mean[BY_AREA][c] ? BY_AREA : BY_PATCH;
+        for (size_t p = 0; p < factors->patch_count; p++)
+            squares[p][c] = mean[way][c] > 0 ? weight(factors, p, way, mean_mm2) * squares[p][c] / mean[way][c] : 0;
+    }
     return true;
 }
 

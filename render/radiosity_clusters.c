@@ -1,5 +1,7 @@
 // The coarse level: irradiance even on each cluster, scattering local (all that light spreads inside a body stays
-// within its cluster). With s the row sums of S', Q the area mean over a cluster and P its transpose,
+// within its cluster). A cluster holds 16 patches, or fewer where its patches see few others: in a gap narrower than a
+// patch light goes from patch to patch, stays for long, and clusters would hold it back. With s the row sums of S', Q
+// the area mean over a cluster and P its transpose,
 //     x = v + s P g,    g = F_c (Q v + s_c g)
 // F_c takes 256 of the rays of a cluster's patches, by a lattice over area and over the sorted row of each patch. The
 // coarse solution is a guess that GMRES corrects: what it gets wrong costs products, not accuracy.
@@ -11,11 +13,13 @@
 #include <string.h>
 
 enum { MEMBERS = 16, CLUSTERS_MAX = 60000 };
-static const double coarse_residual = 0.03;
+static const double coarse_residual = 0.1;
+static const double seen_share = 0.03; // no cluster is more than that of the patches that one of its own sees
 
 typedef struct placed {
     uint64_t key; // material, main direction, place along a Morton curve
     uint32_t patch;
+    float sees; // about so many patches
 } placed;
 
 static int by_key(const void *a, const void *b)
@@ -41,7 +45,25 @@ static uint64_t main_direction(alb_vector n)
     return x >= y && x >= z ? n.x > 0 : y >= z ? 2 + (n.y > 0) : 4 + (n.z > 0);
 }
 
-static void place(placed *out, const alb_patches *patches)
+// One over the chance that two of its rays hit the same patch; INFINITY where none do.
+static float patches_seen(uint32_t *row, const alb_form_factors *factors, uint32_t patch)
+{
+    const int rays = alb_form_factors_rays(factors, patch), even = (rays + 1) / 2;
+    double pairs = 0;
+    alb_form_factors_row(row, factors, patch); // two lists in order
+    for (int i = 0, k = even; i < even || k < rays;) {
+        const uint32_t hit = k == rays || (i < even && row[i] <= row[k]) ? row[i] : row[k];
+        double same = 0;
+        for (; i < even && row[i] == hit; i++)
+            same++;
+        for (; k < rays && row[k] == hit; k++)
+            same++;
+        pairs += hit < factors->patch_count ? same * (same - 1) : 0;
+    }
+    return (float)(pairs > 0 ? (double)rays * (rays - 1) / pairs : (double)INFINITY);
+}
+
+static void place(placed *out, const alb_patches *patches, const alb_form_factors *factors, uint32_t *row)
 {
     alb_vector low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t p = 0; p < patches->count; p++) {
@@ -50,29 +72,45 @@ static void place(placed *out, const alb_patches *patches)
         high = (alb_vector){fmax(high.x, c.x), fmax(high.y, c.y), fmax(high.z, c.z)};
     }
     const double side = fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z));
-    for (size_t p = 0; p < patches->count; p++) {
+    for (uint32_t p = 0; p < patches->count; p++) {
         const alb_vector c = alb_times(side > 0 ? 1 / side : 0, alb_sub(patches->centroids[p], low));
         const uint64_t group = patches->mesh->groups[p];
         out[p].key =
             group << 36 | main_direction(patches->normals[p]) << 32 | spread(c.x) << 2 | spread(c.y) << 1 | spread(c.z);
-        out[p].patch = (uint32_t)p;
+        out[p].patch = p;
+        out[p].sees = patches_seen(row, factors, p);
     }
 }
 
-// Numbers the clusters in the order of the sorted patches, none across materials or directions.
-static size_t cut(uint16_t *cluster, const placed *sorted, size_t n)
+// Numbers the clusters in the order of the sorted patches, none across materials or directions; `times` as large as
+// they should be.
+static size_t cut(uint16_t *cluster, const placed *sorted, size_t n, double times)
 {
-    const size_t size = n / (CLUSTERS_MAX / 2) > MEMBERS ? n / (CLUSTERS_MAX / 2) : MEMBERS;
     size_t count = 0, held = 0;
+    double room = 0;
     for (size_t k = 0; k < n; k++) {
-        if (k && (held == size || sorted[k].key >> 32 != sorted[k - 1].key >> 32)) {
-            held = 0;
+        const double here = times * fmin(seen_share * (double)sorted[k].sees, MEMBERS);
+        room = held ? fmin(room, here) : here;
+        if (held && ((double)held >= room || sorted[k].key >> 32 != sorted[k - 1].key >> 32)) {
             count += count < CLUSTERS_MAX - 1;
+            held = 0;
+            room = here;
         }
         cluster[sorted[k].patch] = (uint16_t)count;
         held++;
     }
     return n ? count + 1 : 0;
+}
+
+// A coarse product costs a quarter of a fine one at most.
+static size_t cut_few(uint16_t *cluster, const placed *sorted, size_t n)
+{
+    const size_t most = n / 4 + 2048 < CLUSTERS_MAX ? n / 4 + 2048 : CLUSTERS_MAX - 1;
+    double times = 1;
+    size_t count = cut(cluster, sorted, n, times);
+    while (count > most && times < (double)n)
+        count = cut(cluster, sorted, n, times *= 2);
+    return count;
 }
 
 // The hits of a cluster's rays: at equal steps through the area of its members, and through the row of each.
@@ -117,9 +155,9 @@ bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, con
     placed *sorted = alb_allocate(n, sizeof *sorted, error);
     bool ok = sorted && (clusters->cluster = alb_allocate(n, sizeof *clusters->cluster, error));
     if (ok) {
-        place(sorted, patches);
+        place(sorted, patches, factors, row);
         qsort(sorted, n, sizeof *sorted, by_key);
-        clusters->count = cut(clusters->cluster, sorted, n);
+        clusters->count = cut_few(clusters->cluster, sorted, n);
         const size_t count = clusters->count;
         ok = (clusters->areas_mm2 = alb_allocate(count, sizeof *clusters->areas_mm2, error)) &&
              (clusters->hits = alb_allocate(count * ALB_CLUSTER_RAYS, sizeof *clusters->hits, error)) &&

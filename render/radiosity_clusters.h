@@ -18,7 +18,8 @@ typedef struct alb_clusters {
 
 enum { ALB_CLUSTER_RAYS = 256 };
 
-// About 16 patches each, of one material and one main direction. row: scratch for the longest row of the factors.
+// About 16 patches each, fewer in narrow gaps, of one material and one main direction. row: scratch for the longest row
+// of the factors.
 bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, const alb_form_factors *factors,
                          const alb_scatter *scatter, uint32_t *row, alb_error *error);
 void alb_clusters_free(alb_clusters *clusters);

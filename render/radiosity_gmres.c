@@ -111,6 +111,25 @@ static void update(alb_run *run, const krylov *s, int steps)
     alb_space_add(NULL, &run->space, run->x, (const double(*)[3])y, s->z, steps);
 }
 
+// r + (K - I) sum y_k z_k in the basis, which is what the rotations left over, turned back: the residual without a
+// product.
+static void take_residual(alb_run *run, const krylov *s, int steps)
+{
+    double along[RESTART + 1][3] = {{0}}, length[3];
+    for (int c = 0; c < 3; c++) {
+        along[steps][c] = -s->rhs[c][steps];
+        for (int i = steps - 1; i >= 0; i--) {
+            along[i][c] = -s->sine[c][i] * along[i + 1][c];
+            along[i + 1][c] *= s->cosine[c][i];
+        }
+    }
+    memset(run->residual, 0, run->space.count * sizeof *run->residual);
+    alb_space_add(length, &run->space, run->residual, (const double(*)[3])along, s->v, steps + 1);
+    alb_space_mean(run->report->residual_flux, &run->space, (const alb_rgb *)run->residual);
+    alb_run_find_floor(run);
+    run->report->residual = run->report->history[run->report->iterations - 1] = alb_run_worst(run, length);
+}
+
 static void restart(alb_run *run, krylov *s)
 {
     double length[3];
@@ -146,7 +165,9 @@ static bool run_with(alb_run *run, bool coarse, alb_error *error)
         while (steps < RESTART && report->iterations < ALB_PRODUCTS_MAX - 1 &&
                report->history[report->iterations - 1] > 0.98 * run->wanted);
         update(run, s, steps);
-        over = alb_run_residual(run) || (report->residual <= run->floor && report->residual > 0.5 * before);
+        take_residual(run, s, steps);
+        over = (report->residual <= run->wanted && run->wanted > 10 * run->floor) || alb_run_residual(run) ||
+               (report->residual <= run->floor && report->residual > 0.5 * before);
     }
     ok = true;
 done:

@@ -5,8 +5,8 @@
 //     area
 // The last is Jacobi after a step along z that leaves the residual without net power: what decays slowest in a closed
 // room is even light.
-// Each ends with a bounce: the product that finds the last residual also makes x = b + K x, whose residual K r is
-// smaller still.
+// Each ends with a bounce: the last residual r, by a product or from the Krylov basis, also makes x + r = b + K x,
+// whose residual K r is smaller still.
 //
 // Convergence: ||K||_inf <= (largest row sum of S') (largest row sum of F) < 1 bounds the spectral radius; rows are
 // what ray-cast factors hold exactly. (The bound rho(SF) <= rho(S) rho(F) of Sheng et al. 2014, sec. 3.3, is false in
@@ -36,14 +36,20 @@ void alb_run_note(alb_run *run, double residual)
     report->iterations++;
 }
 
+void alb_run_find_floor(alb_run *run)
+{
+    double size[3];
+    alb_space_norm(size, &run->space, (const alb_rgb *)run->x);
+    run->floor = ALB_RESIDUAL_LEAST * fmax(1, alb_run_worst(run, size));
+}
+
 bool alb_run_residual(alb_run *run)
 {
-    double length[3], size[3];
+    double length[3];
     run->bounce->apply(run->residual, run->bounce->data, (const alb_rgb *)run->x);
     alb_space_residual(length, run->report->residual_flux, &run->space, run->residual, run->right,
                        (const alb_rgb *)run->x);
-    alb_space_norm(size, &run->space, (const alb_rgb *)run->x);
-    run->floor = ALB_RESIDUAL_LEAST * fmax(1, alb_run_worst(run, size));
+    alb_run_find_floor(run);
     run->report->residual = alb_run_worst(run, length);
     alb_run_note(run, run->report->residual);
     return run->report->residual <= run->wanted || run->report->iterations >= ALB_PRODUCTS_MAX;

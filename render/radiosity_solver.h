@@ -32,8 +32,8 @@ typedef struct alb_bounce {
 
 typedef struct alb_radiosity_report {
     int iterations;                       // products with K
-    double residual;                      // |b + K x - x| / |b|, area-weighted 2-norm, worst channel, recomputed at the
-                                          // end. What is returned is b + K x, one bounce better
+    double residual;                      // |b + K x - x| / |b|, area-weighted 2-norm, worst channel; of the vectors
+                                          // themselves, no estimate. What is returned is b + K x, one bounce better
     double residual_flux[3];              // mean over area of |b + K x - x|
     double history[ALB_PRODUCTS_MAX + 1]; // residual after each product
 } alb_radiosity_report;
@@ -57,6 +57,8 @@ typedef struct alb_run {
 
 // One product: residual = b + K x - x, noted. True where the run is over: it is small enough, or products are spent.
 bool alb_run_residual(alb_run *run);
+// Sets the floor for x as it stands.
+void alb_run_find_floor(alb_run *run);
 // Largest of length[c] / scale[c].
 double alb_run_worst(const alb_run *run, const double length[3]);
 // Counts a product and notes the residual after it.

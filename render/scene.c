@@ -186,19 +186,29 @@ static bool read_camera(alb_scene_reader *in, alb_node root)
     return true;
 }
 
+void alb_scene_ask_error(alb_scene *scene, double percent)
+{
+    scene->error_percent = percent;
+    if (!scene->rays_given)
+        scene->rays_per_patch = ALB_RAYS_REFINED_FROM;
+}
+
 static bool read_settings(alb_scene *scene, alb_node root, alb_error *error)
 {
-    const bool stated = alb_node_has(root, "error_percent");
-    long rays = stated ? 64 : 256, seed = 1, memory_mb = 4096, frames = 1;
+    long rays = 256, seed = 1, memory_mb = 4096, frames = 1;
     scene->residual = 1e-4;
-    if ((stated && !alb_node_number(&scene->error_percent, root, "error_percent", 0.01, 100, error)) ||
+    scene->rays_given = alb_node_has(root, "rays_per_patch");
+    if ((alb_node_has(root, "error_percent") &&
+         !alb_node_number(&scene->error_percent, root, "error_percent", 0.01, 100, error)) ||
         (alb_node_has(root, "memory_mb") && !alb_node_integer(&memory_mb, root, "memory_mb", 1, 1L << 24, error)) ||
-        (alb_node_has(root, "rays_per_patch") && !alb_node_integer(&rays, root, "rays_per_patch", 1, 65536, error)) ||
+        (scene->rays_given && !alb_node_integer(&rays, root, "rays_per_patch", 1, 65536, error)) ||
         (alb_node_has(root, "frames") && !alb_node_integer(&frames, root, "frames", 1, ALB_FRAMES_MAX, error)) ||
         (alb_node_has(root, "seed") && !alb_node_integer(&seed, root, "seed", 0, 0x7fffffff, error)) ||
         (alb_node_has(root, "residual") && !alb_node_number(&scene->residual, root, "residual", 1e-12, 0.1, error)))
         return false;
     scene->rays_per_patch = (int)rays;
+    if (scene->error_percent > 0)
+        alb_scene_ask_error(scene, scene->error_percent);
     scene->memory_bytes = (size_t)memory_mb << 20;
     scene->seed = (uint64_t)seed;
     scene->frames = (int)frames;

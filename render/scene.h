@@ -35,7 +35,8 @@
 #include "render/light.h"
 #include "render/scatter.h"
 
-enum { ALB_OBJECTS_MAX = 256, ALB_SURFACES_MAX = 256, ALB_LIGHTS_MAX = 64, ALB_RAYS_REFINED_MAX = 4096 };
+enum { ALB_OBJECTS_MAX = 256, ALB_SURFACES_MAX = 256, ALB_LIGHTS_MAX = 64 };
+enum { ALB_RAYS_REFINED_FROM = 64, ALB_RAYS_REFINED_MAX = 4096 };
 enum { ALB_FRAMES_MAX = 100000 };
 
 // The vertices of one object in the scene's mesh.
@@ -54,6 +55,7 @@ typedef struct alb_scene {
     size_t light_count;
     alb_camera camera;
     int rays_per_patch;
+    bool rays_given;      // in the file
     double error_percent; // 0: as many rays as rays_per_patch says
     size_t memory_bytes;  // 0: no limit
     double residual;
@@ -69,4 +71,6 @@ bool alb_scene_read_frame(alb_scene *scene, alb_provenance *provenance, const ch
 // `name` with each run of # replaced by the number, as many digits as there are #, zeros in front; more where it is
 // longer. False: the result is longer than a path may be.
 bool alb_scene_frame_name(char out[ALB_PATH_SIZE], const char *name, int frame, alb_error *error);
+// As error_percent in the file does: rows start at few rays where the file does not say how many.
+void alb_scene_ask_error(alb_scene *scene, double percent);
 void alb_scene_free(alb_scene *scene);

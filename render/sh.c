@@ -6,19 +6,42 @@
 // 256 they leave the range of double.
 #include "render/sh.h"
 #include "render/sh_lanes.h"
+#include <pthread.h>
 
-// a_lm; zero where the recurrence begins.
-static double step(int l, int m) { return l > m ? sqrt((4.0 * l * l - 1) / ((double)(l - m) * (l + m))) : 0; }
+// a_lm and a_lm / a_l-1,m; zero where the recurrence begins. Those of the bands most in use are kept.
+typedef struct step {
+    double a, b;
+} step;
+enum { KEPT = 32 };
+static step kept[KEPT][KEPT];
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+
+static double root(int l, int m) { return sqrt((4.0 * l * l - 1) / ((double)(l - m) * (l + m))); }
+
+static step make_step(int l, int m)
+{
+    return (step){l > m ? root(l, m) : 0, l > m + 1 ? root(l, m) / root(l - 1, m) : 0};
+}
+
+static void make_kept(void)
+{
+    for (int l = 0; l < KEPT; l++)
+        for (int m = 0; m <= l; m++)
+            kept[l][m] = make_step(l, m);
+}
+
+static step step_to(int l, int m) { return l < KEPT ? kept[l][m] : make_step(l, m); }
 
 // From P^_l-1,m and P^_l-2,m.
 static double next(int l, int m, double cosine, double last, double before)
 {
-    const double a = step(l, m);
-    return a * (cosine * last - (l > m + 1 ? before / step(l - 1, m) : 0));
+    const step s = step_to(l, m);
+    return s.a * cosine * last - s.b * before;
 }
 
 void alb_sh_legendre(double *values, int order, double cosine, double sine)
 {
+    pthread_once(&once, make_kept);
     double first = 1 / sqrt(4 * M_PI);
     for (int m = 0; m < order; m++) {
         if (m)
@@ -50,6 +73,7 @@ static void begin_column(column *c, int m, alb_vector d)
 
 void alb_sh_evaluate(double *values, int order, alb_vector d)
 {
+    pthread_once(&once, make_kept);
     column c;
     for (int m = 0; m < order; m++) {
         begin_column(&c, m, d);
@@ -68,6 +92,7 @@ void alb_sh_evaluate(double *values, int order, alb_vector d)
 // t_z. Both of an extension of Y off the sphere, which a tangent does not leave.
 void alb_sh_differentiate(double *values, int order, alb_vector d, alb_vector t)
 {
+    pthread_once(&once, make_kept);
     column c = {0};
     for (int m = 0; m < order; m++) {
         const double re = m * (c.re * t.x - c.im * t.y), im = m * (c.re * t.y + c.im * t.x);
@@ -75,7 +100,7 @@ void alb_sh_differentiate(double *values, int order, alb_vector d, alb_vector t)
         double last = 0, before = 0, slope = 0, slope_before = 0;
         for (int l = m; l < order; l++) {
             const double value = l > m ? next(l, m, d.z, last, before) : c.first;
-            const double rise = l > m ? next(l, m, d.z, slope, slope_before) + step(l, m) * last : 0;
+            const double rise = l > m ? next(l, m, d.z, slope, slope_before) + step_to(l, m).a * last : 0;
             before = last, last = value;
             slope_before = slope, slope = rise;
             values[alb_sh_index(l, m)] = rise * t.z * c.re + value * re;
@@ -87,6 +112,7 @@ void alb_sh_differentiate(double *values, int order, alb_vector d, alb_vector t)
 
 double alb_sh_value(const double *coefficients, int order, alb_vector direction)
 {
+    pthread_once(&once, make_kept);
     double sum = 0;
     column c;
     for (int m = 0; m < order; m++) {
@@ -108,13 +134,14 @@ typedef struct steps {
 
 static void make_steps(steps *s, int order)
 {
+    pthread_once(&once, make_kept);
     column c;
     for (int m = 0; m < order; m++) {
         begin_column(&c, m, (alb_vector){0});
         s->first[m] = (float)c.first;
         for (int l = m + 1; l < order; l++) {
-            s->a[l * (l + 1) / 2 + m] = (float)step(l, m);
-            s->b[l * (l + 1) / 2 + m] = (float)(l > m + 1 ? step(l, m) / step(l - 1, m) : 0);
+            s->a[l * (l + 1) / 2 + m] = (float)step_to(l, m).a;
+            s->b[l * (l + 1) / 2 + m] = (float)step_to(l, m).b;
         }
     }
 }

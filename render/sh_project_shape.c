@@ -21,8 +21,9 @@ void alb_sh_project_cap(double *out, int order, alb_vector axis, double angle)
 void alb_sh_project_sphere(double *out, int order, alb_vector centre, double radius)
 {
     const double distance = alb_length(centre);
-    alb_sh_project_cap(out, order, distance > radius ? alb_unit(centre) : (alb_vector){0, 0, 1},
-                       distance > radius ? asin(radius / distance) : M_PI);
+    const bool inside = distance <= radius;
+    alb_sh_project_cap(out, order, inside ? (alb_vector){0, 0, 1} : alb_unit(centre),
+                       inside ? M_PI : asin(radius / distance));
 }
 
 // From the integrals of dY / dn and the solid angle, the sense of the outline unknown.

@@ -5,7 +5,7 @@
 void alb_sh_regress_at(alb_sh_scaling *scaling, double k)
 {
     const double u = 1 - 1 / fmax(k, 1), x = 2 * u - 1, share = (1 - u) * (1 - u);
-    *scaling = (alb_sh_scaling){.order_out = ALB_SH_REGRESS_ORDER, .order_in = ALB_SH_REGRESS_ORDER};
+    scaling->order_out = scaling->order_in = ALB_SH_REGRESS_ORDER;
     for (int i = 0; i < ALB_SH_REGRESS_VALUES; i++) {
         double next = 0, after = 0;
         for (int j = ALB_SH_REGRESS_POWERS - 1; j >= 1; j--) {

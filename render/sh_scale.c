@@ -92,7 +92,8 @@ bool alb_sh_scaling_begin(alb_sh_scaling *scaling, int order_out, int order_in, 
     if (order_out < 1 || order_out > most || order_in < 1 || order_in > most)
         return alb_fail(error, ALB_USAGE, "angular scaling of order %d to %d; expected 1 to %d", order_in, order_out,
                         most);
-    *scaling = (alb_sh_scaling){.order_out = order_out, .order_in = order_in};
+    scaling->order_out = order_out, scaling->order_in = order_in;
+    memset(scaling->value, 0, (size_t)alb_sh_scaling_count(order_out, order_in) * sizeof *scaling->value);
     return true;
 }
 

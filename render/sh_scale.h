@@ -26,7 +26,8 @@ int alb_sh_scaling_count(int order_out, int order_in);
 // Where the value of (m, l_out, l_in) is stored; 0 <= m <= l_out < order_out, m <= l_in < order_in.
 int alb_sh_scaling_index(int order_out, int order_in, int m, int l_out, int l_in);
 
-// All zero. ALB_USAGE where an order is not from 1 to ALB_SH_SCALING_ORDER_MAX.
+// The orders, and their values zero; what is behind them stays. ALB_USAGE where an order is not from 1 to
+// ALB_SH_SCALING_ORDER_MAX.
 bool alb_sh_scaling_begin(alb_sh_scaling *scaling, int order_out, int order_in, alb_error *error);
 // M by adaptive Gauss quadrature along the map, within 1e-13. Fails with ALB_BAD_DATA where a map of
 // the caller's has no finite integral. Some 0.1 ms at order 4, more near the map's limits.

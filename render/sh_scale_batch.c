@@ -1,5 +1,6 @@
-// Blocks of eight receivers: each takes its two rows of the table and interpolates them, eight values at a time; eight
-// such vectors are turned over so that a vector holds one value of all eight; then the sparse product, eight wide.
+// Blocks of eight receivers: each takes its cell of the table, the values at its start and their rise, adds them up,
+// eight values at a time; eight such vectors are turned over so that a vector holds one value of all eight; then the
+// sparse product, eight wide.
 #include "render/sh_scale_batch.h"
 #include "base/memory.h"
 #include "base/vector_clones.h"
@@ -8,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LANES = 8, PADDED_MAX = 208 }; // order 8: 204
+enum { LANES = 8, BLOCKS = 8, PADDED_MAX = 208 }; // order 8: 204
 typedef float eight __attribute__((vector_size(LANES * sizeof(float))));
 typedef int32_t eight_bits __attribute__((vector_size(LANES * sizeof(int32_t))));
 #define INLINE static inline __attribute__((always_inline))
@@ -18,6 +19,16 @@ static bool falls(const alb_sh_law *law)
     return law->kind == ALB_SH_LAW_LIGHT || law->kind == ALB_SH_LAW_OCCLUSION || law->kind == ALB_SH_LAW_REGRESSED;
 }
 
+// The value at knot i: the start of cell i, and the end of the cell before it.
+static void store(alb_sh_batch *batch, int i, int v, float value)
+{
+    float *cell = batch->rows + (size_t)(2 * i * batch->padded + v);
+    if (i > 0)
+        cell[-batch->padded] = value - cell[-2 * batch->padded];
+    if (i < batch->cells)
+        *cell = value;
+}
+
 bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, alb_error *error)
 {
     const int count = alb_sh_scaling_count(law->order_out, law->order_in);
@@ -25,7 +36,7 @@ bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, 
     if (cells < 8 || cells > 4096 || cells % 2 || law->order_out > ALB_SH_ORDER_MAX || law->order_in > ALB_SH_ORDER_MAX)
         return alb_fail(error, ALB_USAGE, "batch of %d cells, order %d to %d; expected 8 to 4096, even, order 1 to %d",
                         cells, law->order_in, law->order_out, ALB_SH_ORDER_MAX);
-    batch->rows = alb_allocate((size_t)(cells + 1) * (size_t)batch->padded, sizeof *batch->rows, error);
+    batch->rows = alb_allocate((size_t)(2 * cells) * (size_t)batch->padded, sizeof *batch->rows, error);
     bool ok = batch->rows != NULL;
     for (int i = 0; i <= cells && ok; i++) {
         const double u = 2. * i / cells - 1;
@@ -34,7 +45,7 @@ bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, 
         alb_sh_scaling m;
         ok = alb_sh_law_at(&m, law, k, error);
         for (int v = 0; v < count && ok; v++)
-            batch->rows[(size_t)(i * batch->padded + v)] = (float)(m.value[v] * (falls(law) && k > 1 ? k * k : 1));
+            store(batch, i, v, (float)(m.value[v] * (falls(law) && k > 1 ? k * k : 1)));
     }
     if (!ok)
         alb_sh_batch_free(batch);
@@ -102,16 +113,16 @@ INLINE void interpolate(eight *m, const alb_sh_batch *batch, const places *p, in
 {
     const float *rows[LANES];
     for (int r = 0; r < LANES; r++)
-        rows[r] = batch->rows + (size_t)p->cell[r] * (size_t)padded;
+        rows[r] = batch->rows + (size_t)p->cell[r] * 2 * (size_t)padded;
 #pragma GCC unroll 4
     for (int v = 0; v < padded; v += LANES) {
         eight row[LANES];
 #pragma GCC unroll 8
         for (int r = 0; r < LANES; r++) {
-            eight low, high;
+            eight low, rise;
             memcpy(&low, rows[r] + v, sizeof low);
-            memcpy(&high, rows[r] + padded + v, sizeof high);
-            row[r] = low + p->share[r] * (high - low);
+            memcpy(&rise, rows[r] + padded + v, sizeof rise);
+            row[r] = low + p->share[r] * rise;
         }
         turn_over(m + v, row);
     }
@@ -119,56 +130,64 @@ INLINE void interpolate(eight *m, const alb_sh_batch *batch, const places *p, in
 
 // One block: coefficient i of its receivers at in + i * stride.
 INLINE void multiply(float *out, size_t out_stride, const eight *value, const float *in, size_t in_stride,
-                     const eight *factor, int order_out, int order_in)
+                     const eight *factor, int rows, int columns, bool transposed)
 {
 #pragma GCC unroll 8
-    for (int m = 0; m < order_out; m++)
+    for (int m = 0; m < rows; m++) {
 #pragma GCC unroll 8
-        for (int l = m; l < order_out; l++) {
+        for (int l = m; l < rows; l++) {
             eight plus = {0}, minus = {0};
 #pragma GCC unroll 8
-            for (int j = m; j < order_in; j++, value++) {
+            for (int j = m; j < columns; j++) {
+                const eight *own =
+                    value + (transposed ? (j - m) * (rows - m) + l - m : (l - m) * (columns - m) + j - m);
                 eight from;
                 memcpy(&from, in + (size_t)(j * (j + 1) + m) * in_stride, sizeof from);
-                plus += *value * from;
+                plus += *own * from;
                 memcpy(&from, in + (size_t)(j * (j + 1) - m) * in_stride, sizeof from);
                 if (m)
-                    minus += *value * from;
+                    minus += *own * from;
             }
             plus *= *factor, minus *= *factor;
             memcpy(out + (size_t)(l * (l + 1) + m) * out_stride, &plus, sizeof plus);
             if (m)
                 memcpy(out + (size_t)(l * (l + 1) - m) * out_stride, &minus, sizeof minus);
         }
+        value += m < columns ? (rows - m) * (columns - m) : 0;
+    }
 }
 
 INLINE void apply_block(float *out, const eight *m, const eight *factor, const float *in, size_t stride, size_t items,
-                        int order_out, int order_in)
+                        int rows, int columns, bool transposed)
 {
     eight from[ALB_SH_COUNT_MAX], to[ALB_SH_COUNT_MAX];
     if (items >= LANES) {
-        multiply(out, stride, m, in, stride, factor, order_out, order_in);
+        multiply(out, stride, m, in, stride, factor, rows, columns, transposed);
         return;
     }
     memset(from, 0, sizeof from);
-    for (int i = 0; i < order_in * order_in; i++)
+    for (int i = 0; i < columns * columns; i++)
         memcpy(&from[i], in + (size_t)i * stride, items * sizeof *in);
-    multiply((float *)to, LANES, m, (const float *)from, LANES, factor, order_out, order_in);
-    for (int i = 0; i < order_out * order_out; i++)
+    multiply((float *)to, LANES, m, (const float *)from, LANES, factor, rows, columns, transposed);
+    for (int i = 0; i < rows * rows; i++)
         memcpy(out + (size_t)i * stride, &to[i], items * sizeof *out);
 }
 
 INLINE void apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride, size_t count,
-                  int order_out, int order_in, int padded)
+                  int rows, int columns, bool transposed, int padded)
 {
-    for (size_t r = 0; r < count; r += LANES) {
-        const size_t items = count - r < LANES ? count - r : LANES;
-        eight m[PADDED_MAX], ratio = {0};
-        places p;
-        memcpy(&ratio, k + r, items * sizeof *k);
-        find_places(&p, batch, &ratio);
-        interpolate(m, batch, &p, padded);
-        apply_block(out + r, m, &p.factor, in + r, stride, items, order_out, order_in);
+    for (size_t first = 0; first < count; first += BLOCKS * LANES) {
+        const size_t left = count - first < BLOCKS * LANES ? count - first : BLOCKS * LANES;
+        eight m[PADDED_MAX], ratios[BLOCKS] = {{0}};
+        places p[BLOCKS];
+        memcpy(ratios, k + first, left * sizeof *k);
+        for (int b = 0; b < BLOCKS; b++)
+            find_places(&p[b], batch, &ratios[b]);
+        for (size_t r = 0; r < left; r += LANES) {
+            interpolate(m, batch, &p[r / LANES], padded);
+            apply_block(out + first + r, m, &p[r / LANES].factor, in + first + r, stride, left - r, rows, columns,
+                        transposed);
+        }
     }
 }
 
@@ -176,26 +195,34 @@ INLINE void apply(float *out, const alb_sh_batch *batch, const float *k, const f
 ALB_VECTOR_CLONES static void apply_four(float *out, const alb_sh_batch *batch, const float *k, const float *in,
                                          size_t stride, size_t count)
 {
-    apply(out, batch, k, in, stride, count, 4, 4, 32);
+    apply(out, batch, k, in, stride, count, 4, 4, false, 32);
 }
 
 ALB_VECTOR_CLONES static void apply_eight_to_four(float *out, const alb_sh_batch *batch, const float *k,
                                                   const float *in, size_t stride, size_t count)
 {
-    apply(out, batch, k, in, stride, count, 4, 8, 72);
+    apply(out, batch, k, in, stride, count, 4, 8, false, 72);
 }
 
 ALB_VECTOR_CLONES static void apply_any(float *out, const alb_sh_batch *batch, const float *k, const float *in,
                                         size_t stride, size_t count)
 {
-    apply(out, batch, k, in, stride, count, batch->law.order_out, batch->law.order_in, batch->padded);
+    apply(out, batch, k, in, stride, count, batch->law.order_out, batch->law.order_in, false, batch->padded);
 }
 
-void alb_sh_batch_apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride,
-                        size_t count)
+ALB_VECTOR_CLONES static void apply_transposed(float *out, const alb_sh_batch *batch, const float *k, const float *in,
+                                               size_t stride, size_t count)
+{
+    apply(out, batch, k, in, stride, count, batch->law.order_in, batch->law.order_out, true, batch->padded);
+}
+
+void alb_sh_batch_apply(float *out, const alb_sh_batch *batch, bool transposed, const float *k, const float *in,
+                        size_t stride, size_t count)
 {
     const alb_sh_law *law = &batch->law;
-    if (law->order_out == 4 && law->order_in == 4)
+    if (transposed)
+        apply_transposed(out, batch, k, in, stride, count);
+    else if (law->order_out == 4 && law->order_in == 4)
         apply_four(out, batch, k, in, stride, count);
     else if (law->order_out == 4 && law->order_in == 8)
         apply_eight_to_four(out, batch, k, in, stride, count);

@@ -5,7 +5,7 @@
 //     backs
 // What changed and what stays: rays know the meshes alone, scattering the meshes and materials, the solve everything.
 // A solution that is already there is the start of the next where the direct light has changed by little: it costs a
-// product, and each product gains about a factor of three.
+// product, and each product gains a factor of five to ten.
 #include "render/solution.h"
 #include "base/memory.h"
 #include "base/progress.h"
@@ -17,7 +17,7 @@
 const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "lights", "scattering", "solve"};
 
 // A change of the direct light, |E - E'| / |E|, below which the last solution is worth a product as a start.
-static const double small_change = 0.3;
+static const double small_change = 0.05;
 static const double scatter_error = 0.005; // relative, of what even light sends out
 static const alb_solver default_solver = ALB_SOLVER_TWO_LEVEL;
 

@@ -73,6 +73,55 @@ static void stated_error_holds(void **state)
     world_free(&w);
 }
 
+// A bright ball of many small patches in a room of few large ones: the ball's own irradiance, smooth, is most of the
+// mean over patches; that of the walls, by the few rays that meet the ball, most of the mean over area. The stated
+// error holds for both. The truth: 16,384 rays, a hundredth of the error. Of 12 cases one may err more.
+static void large_patches_count_by_their_area(void **state)
+{
+    (void)state;
+    enum { TRIALS = 6 };
+    alb_error error = {0};
+    int over = 0;
+    world w = {0};
+    alb_mesh ball = {0};
+    alb_form_factors fine;
+    const alb_box walls = {.size_mm = {4, 4, 4}, .cells = {3, 3, 3}, .grading = 1, .inward = true};
+    const alb_sphere sphere = {.radius_mm = 0.4, .subdivisions = 3};
+    check_ok(alb_shape_box(&w.mesh, &walls, &error), &error);
+    check_ok(alb_shape_sphere(&ball, &sphere, &error), &error);
+    check_ok(alb_mesh_append(&w.mesh, &ball, 1, (alb_vector){0}, &error), &error);
+    world_of(&w);
+    const size_t n = w.patches.count, first = n - ball.face_count;
+    rgb *radiosity = calloc(n, sizeof *radiosity), *truth = calloc(n, sizeof *truth), *found = calloc(n, sizeof *found);
+    for (size_t p = 0; p < n; p++)
+        for (int c = 0; c < 3; c++)
+            radiosity[p][c] = p < first ? 0.5 : 5;
+    cast(&fine, &w, 16384, 77);
+    alb_form_factors_apply(truth, &fine, (const rgb *)radiosity);
+    for (uint64_t trial = 0; trial < TRIALS; trial++) {
+        alb_form_factors factors;
+        double stated, off[2] = {0}, all[2] = {0};
+        cast(&factors, &w, 64, trial);
+        check_ok(alb_form_factors_error(&stated, &factors, (const rgb *)radiosity, NULL, &error), &error);
+        alb_form_factors_apply(found, &factors, (const rgb *)radiosity);
+        for (size_t p = 0; p < n; p++)
+            for (int way = 0; way < 2; way++) {
+                off[way] += (way ? w.patches.areas_mm2[p] : 1) * pow(found[p][0] - truth[p][0], 2);
+                all[way] += (way ? w.patches.areas_mm2[p] : 1) * pow(truth[p][0], 2);
+            }
+        for (int way = 0; way < 2; way++)
+            over += 100 * sqrt(off[way] / all[way]) > stated;
+        alb_form_factors_free(&factors);
+    }
+    assert_true(over <= 1);
+    alb_form_factors_free(&fine);
+    alb_mesh_free(&ball);
+    world_free(&w);
+    free(radiosity);
+    free(truth);
+    free(found);
+}
+
 // A room with a ball under a point light, to a stated error: fewer rays than even rows that state the same.
 static void rays_go_where_light_needs_them(void **state)
 {
@@ -138,6 +187,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(stated_error_holds),
+        cmocka_unit_test(large_patches_count_by_their_area),
         cmocka_unit_test(rays_go_where_light_needs_them),
         cmocka_unit_test(a_scene_reaches_its_error),
     };

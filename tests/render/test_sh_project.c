@@ -259,6 +259,34 @@ static void discs(void **state)
     check_fails(alb_sh_project_disc(disc, ORDER, axis, axis, NAN, &error), &error, ALB_BAD_DATA, "radius");
 }
 
+// A disc near its rim is what inscribed polygons tend to: of n and 2n vertices the error falls like n^-2, extrapolated
+// like n^-4.
+static void discs_near_the_rim(void **state)
+{
+    (void)state;
+    enum { VERTICES = 8000 };
+    alb_error error = {0};
+    static alb_vector outline[2 * VERTICES];
+    for (int k = 0; k < 6; k++) {
+        const double aside = k % 2 ? 0.99 : 1.01, height = k / 2 * 0.02 + 0.005;
+        const alb_vector centre = {aside, 0.02, height};
+        double coarse[16], fine[16], disc[16];
+        for (int i = 0; i < 2 * VERTICES; i++) {
+            const double s = M_PI * i / VERTICES;
+            outline[i] = alb_add(centre, (alb_vector){cos(s), sin(s), 0});
+        }
+        check_ok(alb_sh_project_polygon(fine, 4, outline, 2 * VERTICES, &error), &error);
+        for (int i = 0; i < VERTICES; i++)
+            outline[i] = outline[2 * i];
+        check_ok(alb_sh_project_polygon(coarse, 4, outline, VERTICES, &error), &error);
+        check_ok(alb_sh_project_disc(disc, 4, centre, (alb_vector){0, 0, -2}, 1, &error), &error);
+        for (int i = 0; i < 16; i++) {
+            check_near(disc[i], (4 * fine[i] - coarse[i]) / 3, 1e-9);
+            assert_true(fabs(fine[i] - coarse[i]) < 1e-4);
+        }
+    }
+}
+
 // Polar coordinates about the axis, 40 x 40 nodes; the smallest to a part in 1e9 of itself.
 static void caps_and_spheres(void **state)
 {
@@ -367,8 +395,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(functions),       cmocka_unit_test(latitude_longitude), cmocka_unit_test(cube_map),
         cmocka_unit_test(even_pictures),   cmocka_unit_test(polygons),           cmocka_unit_test(polygons_at_the_edge),
-        cmocka_unit_test(discs),           cmocka_unit_test(caps_and_spheres),   cmocka_unit_test(zonal_functions),
-        cmocka_unit_test(batches_of_caps),
+        cmocka_unit_test(discs),           cmocka_unit_test(discs_near_the_rim), cmocka_unit_test(caps_and_spheres),
+        cmocka_unit_test(zonal_functions), cmocka_unit_test(batches_of_caps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
