@@ -184,21 +184,20 @@ static bool make(alb_text *text, const alb_sh_law *law, const double *ratios, in
 static bool run(int argc, char **argv, alb_error *error)
 {
     static const char *const formats[] = {"csv", "c", "glsl"};
-    const char *map = NULL, *k = NULL, *alpha = NULL, *order = NULL, *in_order = NULL, *measure = NULL, *format = "csv";
-    const char *given = NULL;
+    const char *map = NULL, *k = NULL, *alpha = NULL, *order = NULL, *in_order = NULL, *measure = NULL, *format = NULL;
     const alb_option options[] = {{"--map", NULL, true, &map, NULL},
                                   {"--k", NULL, true, &k, NULL},
                                   {"--alpha", NULL, false, &alpha, NULL},
                                   {"--order", NULL, false, &order, NULL},
                                   {"--in-order", NULL, false, &in_order, NULL},
                                   {"--measure", NULL, false, &measure, NULL},
-                                  {"--format", NULL, false, &given, NULL}};
+                                  {"--format", NULL, false, &format, NULL}};
     alb_sh_law law = {.alpha_deg = 45, .order_out = 4};
     double ratios[RATIOS_MAX];
     int count, kind, map_kind, shape;
     if (!alb_options_read(options, sizeof options / sizeof options[0], argc, argv, error) ||
         !find_name(&map_kind, "--map", map, alb_sh_map_names, ALB_SH_MAP_CUSTOM, error) ||
-        !find_name(&shape, "--format", given ? given : format, formats, 3, error))
+        !find_name(&shape, "--format", format ? format : "csv", formats, 3, error))
         return false;
     law.map = (alb_sh_map_kind)map_kind;
     const char *usual = law.map == ALB_SH_MAP_SPHERE ? "occlusion" : "visibility";

@@ -130,47 +130,51 @@ INLINE void interpolate(eight *m, const alb_sh_batch *batch, const places *p, in
 
 // One block: coefficient i of its receivers at in + i * stride.
 INLINE void multiply(float *out, size_t out_stride, const eight *value, const float *in, size_t in_stride,
-                     const eight *factor, int order_out, int order_in)
+                     const eight *factor, int rows, int columns, bool transposed)
 {
 #pragma GCC unroll 8
-    for (int m = 0; m < order_out; m++)
+    for (int m = 0; m < rows; m++) {
 #pragma GCC unroll 8
-        for (int l = m; l < order_out; l++) {
+        for (int l = m; l < rows; l++) {
             eight plus = {0}, minus = {0};
 #pragma GCC unroll 8
-            for (int j = m; j < order_in; j++, value++) {
+            for (int j = m; j < columns; j++) {
+                const eight *own =
+                    value + (transposed ? (j - m) * (rows - m) + l - m : (l - m) * (columns - m) + j - m);
                 eight from;
                 memcpy(&from, in + (size_t)(j * (j + 1) + m) * in_stride, sizeof from);
-                plus += *value * from;
+                plus += *own * from;
                 memcpy(&from, in + (size_t)(j * (j + 1) - m) * in_stride, sizeof from);
                 if (m)
-                    minus += *value * from;
+                    minus += *own * from;
             }
             plus *= *factor, minus *= *factor;
             memcpy(out + (size_t)(l * (l + 1) + m) * out_stride, &plus, sizeof plus);
             if (m)
                 memcpy(out + (size_t)(l * (l + 1) - m) * out_stride, &minus, sizeof minus);
         }
+        value += m < columns ? (rows - m) * (columns - m) : 0;
+    }
 }
 
 INLINE void apply_block(float *out, const eight *m, const eight *factor, const float *in, size_t stride, size_t items,
-                        int order_out, int order_in)
+                        int rows, int columns, bool transposed)
 {
     eight from[ALB_SH_COUNT_MAX], to[ALB_SH_COUNT_MAX];
     if (items >= LANES) {
-        multiply(out, stride, m, in, stride, factor, order_out, order_in);
+        multiply(out, stride, m, in, stride, factor, rows, columns, transposed);
         return;
     }
     memset(from, 0, sizeof from);
-    for (int i = 0; i < order_in * order_in; i++)
+    for (int i = 0; i < columns * columns; i++)
         memcpy(&from[i], in + (size_t)i * stride, items * sizeof *in);
-    multiply((float *)to, LANES, m, (const float *)from, LANES, factor, order_out, order_in);
-    for (int i = 0; i < order_out * order_out; i++)
+    multiply((float *)to, LANES, m, (const float *)from, LANES, factor, rows, columns, transposed);
+    for (int i = 0; i < rows * rows; i++)
         memcpy(out + (size_t)i * stride, &to[i], items * sizeof *out);
 }
 
 INLINE void apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride, size_t count,
-                  int order_out, int order_in, int padded)
+                  int rows, int columns, bool transposed, int padded)
 {
     for (size_t first = 0; first < count; first += BLOCKS * LANES) {
         const size_t left = count - first < BLOCKS * LANES ? count - first : BLOCKS * LANES;
@@ -181,8 +185,8 @@ INLINE void apply(float *out, const alb_sh_batch *batch, const float *k, const f
             find_places(&p[b], batch, &ratios[b]);
         for (size_t r = 0; r < left; r += LANES) {
             interpolate(m, batch, &p[r / LANES], padded);
-            apply_block(out + first + r, m, &p[r / LANES].factor, in + first + r, stride, left - r, order_out,
-                        order_in);
+            apply_block(out + first + r, m, &p[r / LANES].factor, in + first + r, stride, left - r, rows, columns,
+                        transposed);
         }
     }
 }
@@ -191,26 +195,34 @@ INLINE void apply(float *out, const alb_sh_batch *batch, const float *k, const f
 ALB_VECTOR_CLONES static void apply_four(float *out, const alb_sh_batch *batch, const float *k, const float *in,
                                          size_t stride, size_t count)
 {
-    apply(out, batch, k, in, stride, count, 4, 4, 32);
+    apply(out, batch, k, in, stride, count, 4, 4, false, 32);
 }
 
 ALB_VECTOR_CLONES static void apply_eight_to_four(float *out, const alb_sh_batch *batch, const float *k,
                                                   const float *in, size_t stride, size_t count)
 {
-    apply(out, batch, k, in, stride, count, 4, 8, 72);
+    apply(out, batch, k, in, stride, count, 4, 8, false, 72);
 }
 
 ALB_VECTOR_CLONES static void apply_any(float *out, const alb_sh_batch *batch, const float *k, const float *in,
                                         size_t stride, size_t count)
 {
-    apply(out, batch, k, in, stride, count, batch->law.order_out, batch->law.order_in, batch->padded);
+    apply(out, batch, k, in, stride, count, batch->law.order_out, batch->law.order_in, false, batch->padded);
 }
 
-void alb_sh_batch_apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride,
-                        size_t count)
+ALB_VECTOR_CLONES static void apply_transposed(float *out, const alb_sh_batch *batch, const float *k, const float *in,
+                                               size_t stride, size_t count)
+{
+    apply(out, batch, k, in, stride, count, batch->law.order_in, batch->law.order_out, true, batch->padded);
+}
+
+void alb_sh_batch_apply(float *out, const alb_sh_batch *batch, bool transposed, const float *k, const float *in,
+                        size_t stride, size_t count)
 {
     const alb_sh_law *law = &batch->law;
-    if (law->order_out == 4 && law->order_in == 4)
+    if (transposed)
+        apply_transposed(out, batch, k, in, stride, count);
+    else if (law->order_out == 4 && law->order_in == 4)
         apply_four(out, batch, k, in, stride, count);
     else if (law->order_out == 4 && law->order_in == 8)
         apply_eight_to_four(out, batch, k, in, stride, count);

@@ -16,7 +16,8 @@ typedef struct alb_sh_batch {
 // alb_sh_batch_free.
 bool alb_sh_batch_create(alb_sh_batch *batch, const alb_sh_law *law, int cells, alb_error *error);
 void alb_sh_batch_free(alb_sh_batch *batch);
-// out[i * stride + r] = M(k[r]) in, coefficient i of receiver r < count <= stride (render/sh.h). `out` may not overlap
-// `in`. k below 0 counts as 0 (mid-range: beyond -1 or 1 as there), NaN gives NaN.
-void alb_sh_batch_apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride,
-                        size_t count);
+// out[i * stride + r] = M(k[r]) in, coefficient i of receiver r < count <= stride (render/sh.h); transposed: M^T, from
+// order_out^2 to order_in^2 coefficients. `out` may not overlap `in`. k below 0 counts as 0 (mid-range: beyond -1 or 1
+// as there), NaN gives NaN. The same bytes wherever a batch is cut.
+void alb_sh_batch_apply(float *out, const alb_sh_batch *batch, bool transposed, const float *k, const float *in,
+                        size_t stride, size_t count);

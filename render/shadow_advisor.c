@@ -49,22 +49,26 @@ static bool emits(const alb_shadow_stage *stage, const alb_scene *scene, size_t 
     return false;
 }
 
-// Vertices of what does not emit; those are seen by their own light alone.
-static void draw(samples *s, const alb_shadow_stage *stage, const alb_scene *scene, uint64_t seed)
+// Vertices that are seen, of what does not emit. False where there are hardly any.
+static bool draw(samples *s, const alb_tracer *tracer, const alb_shadow_stage *stage, const alb_scene *scene,
+                 double offset_mm, uint64_t seed)
 {
     alb_random random = alb_random_at(seed, 0xad71, 0);
     for (int n = 0; n < VERTICES; n++) {
         size_t v = 0;
-        for (int tries = 0; tries < 100; tries++) {
+        int tries = 0;
+        do {
+            if (++tries > 1000)
+                return false;
             v = (size_t)(alb_random_uniform(&random) * (double)scene->mesh.vertex_count);
-            if (!emits(stage, scene, v))
-                break;
-        }
+        } while (emits(stage, scene, v) ||
+                 alb_shadow_buried(tracer, scene->mesh.vertices[v], stage->normals[v], offset_mm));
         s->points[n] = scene->mesh.vertices[v];
         s->normals[n] = stage->normals[v];
         for (int c = 0; c < 3; c++)
             s->found[n][c] = stage->irradiance[v][c];
     }
+    return true;
 }
 
 static void compare(double *percent, double *upper_percent, const samples *s)
@@ -85,8 +89,7 @@ static void compare(double *percent, double *upper_percent, const samples *s)
         *percent = fmax(100 * sqrt(fmax(square, 0)) / mean, isnan(*percent) ? 0 : *percent);
         upper = fmax(100 * sqrt(fmax(square + 2 * spread, 0)) / mean, isnan(upper) ? 0 : upper);
     }
-    if (upper_percent)
-        *upper_percent = upper;
+    *upper_percent = upper;
 }
 
 bool alb_shadow_error(double *percent, double *upper_percent, const alb_shadow_stage *stage, const alb_scene *scene,
@@ -96,12 +99,13 @@ bool alb_shadow_error(double *percent, double *upper_percent, const alb_shadow_s
     alb_tracer tracer = {0};
     float(*radiance)[3] = NULL;
     samples *s = alb_allocate(1, sizeof *s, error);
+    *percent = *upper_percent = NAN;
     const bool ok = s && collect(&mesh, &radiance, stage, scene, error) && alb_tracer_create(&tracer, &mesh, error);
-    if (ok) {
-        draw(s, stage, scene, seed);
+    const double offset_mm = 256 * tracer.slack_mm;
+    if (ok && draw(s, &tracer, stage, scene, offset_mm, seed)) {
         for (int half = 0; half < 2; half++)
             alb_shadow_cast(s->halves[half], &tracer, (const float(*)[3])radiance, scene->lights, scene->light_count,
-                            s->points, s->normals, VERTICES, STRATA, 256 * tracer.slack_mm, seed + (uint64_t)half);
+                            s->points, s->normals, VERTICES, STRATA, offset_mm, seed + (uint64_t)half);
         compare(percent, upper_percent, s);
     }
     alb_tracer_free(&tracer);

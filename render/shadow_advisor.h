@@ -4,7 +4,7 @@
 
 // rms error of the lit stage's irradiance over vertices drawn at random, against rays, in percent of the mean
 // irradiance; the rays' own random error is taken off. Worst channel. NAN where nothing is lit. The error of a share of
-// vertices is known to some percent of itself: *upper_percent (may be NULL) is above the true one in 95 of 100 scenes.
+// vertices is known to some percent of itself: *upper_percent is above the true one in 95 of 100 scenes.
 bool alb_shadow_error(double *percent, double *upper_percent, const alb_shadow_stage *stage, const alb_scene *scene,
                       uint64_t seed, alb_error *error);
 

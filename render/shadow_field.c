@@ -18,7 +18,7 @@
 const alb_shadow_settings alb_shadow_defaults = {
     .order = 4, .cells = 8, .pixels = 64, .distance = 1.1, .outer = 1, .rays = 512, .cluster = 0.04};
 const alb_shadow_settings alb_shadow_light_settings = {
-    .order = 4, .cells = 8, .pixels = 64, .distance = 1.1, .outer = 6};
+    .order = 4, .cells = 8, .pixels = 40, .distance = 1.1, .outer = 6};
 const double alb_shadow_inner_radii[ALB_SHADOW_INNER_MAX] = {0.75, 0.5, 0.3},
              alb_shadow_outer_ratios[ALB_SHADOW_OUTER_MAX] = {1, 1.4, 2, 3.2, 6, 12};
 
@@ -31,6 +31,8 @@ typedef struct alb_shadow_work { // of one thread
 typedef struct alb_shadow_studio {
     alb_shadow_shape shape;
     alb_shadow_lens lenses[ALB_SHADOW_OUTER_MAX];
+    alb_vector *vertices; // that the samples are of
+    bool sampled;
     alb_vector *directions; // of the nodes
     float *axes;            // [3][nodes]: from each node to the middle
     float *local;           // [channel][value][nodes]: in the pictures' frames
@@ -82,9 +84,9 @@ static bool create_works(studio *s, const alb_shadow_settings *settings, alb_err
         if (!(w->corners.x = alb_allocate(n, sizeof(float), error)) ||
             !(w->corners.y = alb_allocate(n, sizeof(float), error)))
             return false;
-        if (s->shape.radiance && (!(w->corners.depth = alb_allocate(n, sizeof(float), error)) ||
-                                  !(w->nearest = alb_allocate(pixels, sizeof *w->nearest, error)) ||
-                                  !(w->seen = alb_allocate(pixels, sizeof *w->seen, error))))
+        if (s->shape.face_colours && (!(w->corners.depth = alb_allocate(n, sizeof(float), error)) ||
+                                      !(w->nearest = alb_allocate(pixels, sizeof *w->nearest, error)) ||
+                                      !(w->seen = alb_allocate(pixels, sizeof *w->seen, error))))
             return false;
     }
     return true;
@@ -138,7 +140,8 @@ bool alb_shadow_field_create(alb_shadow_field *field, const alb_shadow_settings 
         field->radii[i] = alb_shadow_inner_radii[inner - 1 - i];
     const size_t per_node = (size_t)field->channels * values_of(field);
     field->samples = alb_allocate((size_t)field->shells * count_of(field) * per_node, sizeof *field->samples, error);
-    bool ok = field->samples != NULL;
+    s->vertices = alb_allocate(mesh->vertex_count, sizeof *s->vertices, error);
+    bool ok = field->samples && s->vertices;
     for (int i = 0; ok && i < settings->outer; i++) {
         const double radius = field->radii[inner + i] = settings->distance * alb_shadow_outer_ratios[i];
         ok = alb_shadow_lens_create(&s->lenses[i], settings->pixels, settings->order, radius, error);
@@ -168,6 +171,7 @@ void alb_shadow_field_free(alb_shadow_field *field)
         for (int i = 0; i < ALB_SHADOW_OUTER_MAX; i++)
             alb_shadow_lens_free(&s->lenses[i]);
         alb_shadow_shape_free(&s->shape);
+        free(s->vertices);
         free(s->directions);
         free(s->axes);
         free(s->local);
@@ -194,9 +198,9 @@ static void take_picture(const alb_shadow_field *field, const alb_shadow_lens *l
     double world_from_picture[3][3];
     alb_sh_axis_rotation(world_from_picture, alb_times(-1, s->directions[n]));
     alb_shadow_project(&w->corners, s->shape.x, s->shape.y, s->shape.z, (const double(*)[3])world_from_picture, lens);
-    if (s->shape.radiance)
+    if (s->shape.face_colours)
         alb_shadow_view_radiance(out, &w->corners, (const uint32_t(*)[3])s->shape.drawn, s->shape.drawn_count,
-                                 (const float(*)[3])s->shape.radiance, lens, w->nearest, w->seen);
+                                 s->shape.face_colours, (const float(*)[3])s->shape.colours, lens, w->nearest, w->seen);
     else
         alb_shadow_view_occlusion(out, &w->corners, (const uint32_t(*)[3])s->shape.drawn, s->shape.drawn_count,
                                   s->shape.closed, lens);
@@ -292,10 +296,15 @@ bool alb_shadow_field_sample(alb_shadow_field *field, const alb_vector *vertices
     studio *s = field->studio;
     if (!alb_shadow_sphere_follow(&field->sphere, vertices, s->shape.vertex_count, s->shape.name, error))
         return false;
+    const size_t bytes = s->shape.vertex_count * sizeof *vertices;
+    if (s->sampled && !memcmp(s->vertices, vertices, bytes)) // what stands still keeps its samples
+        return true;
+    memcpy(s->vertices, vertices, bytes);
     alb_shadow_shape_place(&s->shape, vertices, &field->sphere);
     for (int outer = 0; outer < field->settings.outer; outer++)
         sample_outside(field, outer);
-    return field->settings.inner == 0 || sample_inside(field, vertices, error);
+    s->sampled = field->settings.inner == 0 || sample_inside(field, vertices, error);
+    return s->sampled;
 }
 
 void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction)

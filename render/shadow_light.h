@@ -2,7 +2,7 @@
 #pragma once
 #include "render/light.h"
 #include "render/shadow_field.h"
-#include "render/shadow_scaling.h"
+#include "render/shadow_laws.h"
 
 // An environment as spherical harmonics: radiance seen from the middle.
 typedef struct alb_shadow_sky {
@@ -12,7 +12,7 @@ typedef struct alb_shadow_sky {
     double radius_mm;     // 0: infinitely far away
 } alb_shadow_sky;
 // Of an environment light. Where it has a radius more bands are kept: nearer to the wall more of them are seen.
-void alb_shadow_sky_create(alb_shadow_sky *sky, const alb_light *environment);
+bool alb_shadow_sky_create(alb_shadow_sky *sky, const alb_light *environment, alb_error *error);
 
 enum { ALB_SHADOW_OCCLUDERS_MAX = 64 };
 
@@ -21,13 +21,18 @@ typedef struct alb_shadow_world {
     const alb_shadow_field *occluders, *lights;
     const alb_shadow_sky *skies;
     size_t occluder_count, light_count, sky_count; // at most ALB_SHADOW_OCCLUDERS_MAX occluders
-    const alb_shadow_scaling *scaling;
+    const alb_shadow_laws *laws;
 } alb_shadow_world;
 
-// irradiance[count][3] at points with unit normals: W/mm^2 where radiance is W/(mm^2 sr).
+// Seconds summed over threads: looking up and scaling of samples; products with all that follows.
+typedef struct alb_shadow_seconds {
+    double scaling, products;
+} alb_shadow_seconds;
+
+// irradiance[count][3] at points with unit normals: W/mm^2 where radiance is W/(mm^2 sr). seconds may be NULL.
 // ALB_BAD_DATA: too many occluders, or a receiver on or beyond the sphere of a sky.
 bool alb_shadow_irradiance(float (*irradiance)[3], const alb_shadow_world *world, const alb_vector *points,
-                           const alb_vector *normals, size_t count, alb_error *error);
+                           const alb_vector *normals, size_t count, alb_shadow_seconds *seconds, alb_error *error);
 
 // Of the receivers that face a light with a field, the share from which its bounding sphere is less than
 // ALB_SHADOW_SMALL_DEG in half-angle: order 4 then blurs its shadows (rms .14 of the irradiance).

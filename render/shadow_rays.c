@@ -55,3 +55,8 @@ void alb_shadow_cast(float (*irradiance)[3], const alb_tracer *tracer, const flo
             irradiance[p][c] = (float)(M_PI / (strata * strata) * sum[c]);
     }
 }
+
+bool alb_shadow_buried(const alb_tracer *tracer, alb_vector point, alb_vector normal, double offset_mm)
+{
+    return alb_tracer_crossings(tracer, alb_add(point, alb_times(offset_mm, normal)), normal) < 0;
+}

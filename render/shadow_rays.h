@@ -12,3 +12,5 @@ void alb_shadow_cast(float (*irradiance)[3], const alb_tracer *tracer, const flo
                      size_t count, int strata, double offset_mm, uint64_t seed);
 // Radiance of an environment seen from a point, also one of finite size.
 void alb_shadow_sky_radiance(double radiance[3], const alb_light *sky, alb_vector from, alb_vector direction);
+// Whether the point lies inside a closed part of the mesh: what is there is never seen.
+bool alb_shadow_buried(const alb_tracer *tracer, alb_vector point, alb_vector normal, double offset_mm);

@@ -47,7 +47,7 @@ static void draw_between_clusters(alb_shadow_shape *shape)
         uint32_t at[3];
         for (int k = 0; k < 3; k++)
             at[k] = shape->cluster_of[shape->faces[f][k]];
-        if (shape->radiance || (at[0] != at[1] && at[1] != at[2] && at[2] != at[0]))
+        if (shape->face_colours || (at[0] != at[1] && at[1] != at[2] && at[2] != at[0]))
             memcpy(shape->drawn[shape->drawn_count++], at, sizeof at);
     }
 }
@@ -91,7 +91,24 @@ static bool allocate(alb_shadow_shape *shape, const alb_mesh *mesh, bool shines,
            (shape->x = alb_allocate(n, sizeof *shape->x, error)) &&
            (shape->y = alb_allocate(n, sizeof *shape->y, error)) &&
            (shape->z = alb_allocate(n, sizeof *shape->z, error)) &&
-           (!shines || (shape->radiance = alb_allocate(mesh->face_count, sizeof *shape->radiance, error)));
+           (!shines || ((shape->face_colours = alb_allocate(mesh->face_count, sizeof *shape->face_colours, error)) &&
+                        (shape->colours = alb_allocate(mesh->face_count + 1, sizeof *shape->colours, error))));
+}
+
+// Neighbours mostly have one colour: the one before is tried first.
+static void find_colours(alb_shadow_shape *shape, const float (*face_radiance)[3])
+{
+    shape->colour_count = 1;
+    for (size_t f = 0; f < shape->face_count; f++) {
+        size_t c = f ? shape->face_colours[f - 1] : 0;
+        if (memcmp(shape->colours[c], face_radiance[f], sizeof *shape->colours) != 0)
+            for (c = 0; c < shape->colour_count; c++)
+                if (!memcmp(shape->colours[c], face_radiance[f], sizeof *shape->colours))
+                    break;
+        if (c == shape->colour_count)
+            memcpy(shape->colours[shape->colour_count++], face_radiance[f], sizeof *shape->colours);
+        shape->face_colours[f] = (uint32_t)c;
+    }
 }
 
 bool alb_shadow_shape_create(alb_shadow_shape *shape, const alb_mesh *mesh, const float (*face_radiance)[3],
@@ -104,7 +121,7 @@ bool alb_shadow_shape_create(alb_shadow_shape *shape, const alb_mesh *mesh, cons
         return false;
     memcpy(shape->faces, mesh->faces, mesh->face_count * sizeof *shape->faces);
     if (face_radiance)
-        memcpy(shape->radiance, face_radiance, mesh->face_count * sizeof *shape->radiance);
+        find_colours(shape, face_radiance);
     if (cell_mm > 0 && !face_radiance) {
         if (!find_clusters(shape, mesh->vertices, cell_mm, error))
             return false;
@@ -128,7 +145,8 @@ void alb_shadow_shape_free(alb_shadow_shape *shape)
     free(shape->x);
     free(shape->y);
     free(shape->z);
-    free(shape->radiance);
+    free(shape->face_colours);
+    free(shape->colours);
     *shape = (alb_shadow_shape){0};
 }
 

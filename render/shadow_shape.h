@@ -14,8 +14,10 @@ typedef struct alb_shadow_shape {
     uint32_t *cluster_of; // of each vertex
     float *share;         // of each vertex in its cluster
     size_t cluster_count;
-    float *x, *y, *z;     // of clusters: means of their vertices
-    float (*radiance)[3]; // of each face; NULL: an occluder
+    float *x, *y, *z;       // of clusters: means of their vertices
+    uint32_t *face_colours; // of each face; NULL: an occluder
+    float (*colours)[3];    // radiance; the first is black, each occurs once
+    size_t colour_count;
 } alb_shadow_shape;
 
 // cell_mm: side of the cubes whose vertices become one; 0: every vertex stays. With radiance every vertex stays.

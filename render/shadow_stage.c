@@ -80,7 +80,7 @@ static void free_fields(alb_shadow_stage *stage)
     free(stage->groups);
     free(stage->normals);
     free(stage->irradiance);
-    alb_shadow_scaling_free(&stage->scaling);
+    alb_shadow_laws_free(&stage->laws);
     const alb_shadow_stage kept = *stage;
     *stage = (alb_shadow_stage){
         .settings = kept.settings, .paper = kept.paper, .skies = kept.skies, .sky_count = kept.sky_count};
@@ -117,7 +117,7 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
     memcpy(stage->groups, mesh->groups, mesh->face_count * sizeof *stage->groups);
     stage->face_count = mesh->face_count;
     stage->vertex_count = mesh->vertex_count;
-    return alb_shadow_scaling_create(&stage->scaling, stage->settings.order, stage->paper, error);
+    return alb_shadow_laws_create(&stage->laws, stage->settings.order, stage->paper, error);
 }
 
 static bool still_fits(const alb_shadow_stage *stage, const alb_mesh *mesh)
@@ -140,7 +140,8 @@ static bool read_skies(alb_shadow_stage *stage, const alb_scene *scene, alb_erro
                 "light %zu is a %s: it has no soft shadow, which is what shadow fields know; give it a size "
                 "as an object that emits, or render by radiosity",
                 i, alb_light_names[scene->lights[i].kind]);
-        alb_shadow_sky_create(&stage->skies[stage->sky_count++], &scene->lights[i]);
+        if (!alb_shadow_sky_create(&stage->skies[stage->sky_count++], &scene->lights[i], error))
+            return false;
     }
     return true;
 }
@@ -170,7 +171,7 @@ alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage)
                               .light_count = stage->light_count,
                               .skies = stage->skies,
                               .sky_count = stage->sky_count,
-                              .scaling = &stage->scaling};
+                              .laws = &stage->laws};
 }
 
 bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
@@ -191,8 +192,9 @@ bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb
     if (ok) {
         const alb_shadow_world world = alb_shadow_stage_world(stage);
         set_normals(stage->normals, mesh);
-        ok =
-            alb_shadow_irradiance(stage->irradiance, &world, mesh->vertices, stage->normals, mesh->vertex_count, error);
+        stage->seconds = (alb_shadow_seconds){0};
+        ok = alb_shadow_irradiance(stage->irradiance, &world, mesh->vertices, stage->normals, mesh->vertex_count,
+                                   &stage->seconds, error);
     }
     stage->sampling_s = sampled_s - start_s;
     stage->light_s = alb_clock_s() - sampled_s;

@@ -15,10 +15,11 @@ typedef struct alb_shadow_stage {
     size_t occluder_count, light_count;
     alb_shadow_sky *skies;
     size_t sky_count;
-    alb_shadow_scaling scaling;
+    alb_shadow_laws laws;
     alb_vector *normals;        // of the vertices: means over their faces by area
     float (*irradiance)[3];     // of the vertices
     double sampling_s, light_s; // of the latest frame
+    alb_shadow_seconds seconds; // of light_s, by threads
 } alb_shadow_stage;
 
 // Lights every vertex of the scene. A stage starts with all zero but settings and paper. Frames of a sequence keep

@@ -38,8 +38,9 @@ void alb_shadow_project(alb_shadow_corners *out, const float *x, const float *y,
 // with fronts_only, those that show their front: the same of a closed surface, in half the time.
 void alb_shadow_view_occlusion(float *out, const alb_shadow_corners *corners, const uint32_t (*faces)[3],
                                size_t face_count, bool fronts_only, const alb_shadow_lens *lens);
-// What shines: out[3][values], the basis times the radiance of the nearest face. Faces seen from the back are black and
-// hide what lies behind them. `nearest` and `seen` are workspace of pixels^2.
+// What shines: out[3][values], the basis times the radiance of the nearest face: colours[face_colours[face]] where its
+// front is seen; colour 0 is black. Backs are black and hide what lies behind them. `nearest` and `seen` are workspace
+// of pixels^2.
 void alb_shadow_view_radiance(float *out, const alb_shadow_corners *corners, const uint32_t (*faces)[3],
-                              size_t face_count, const float (*face_radiance)[3], const alb_shadow_lens *lens,
-                              float *nearest, uint32_t *seen);
+                              size_t face_count, const uint32_t *face_colours, const float (*colours)[3],
+                              const alb_shadow_lens *lens, float *nearest, uint32_t *seen);

@@ -9,7 +9,11 @@
 #include "base/file.h"
 #include "base/memory.h"
 #include "base/plot.h"
+#include "base/random.h"
 #include "render/sh_regress.h"
+#include "render/tracer.h"
+#include "scenes/animal.h"
+#include "scenes/shapes.h"
 #include "scenes/sphere_cluster.h"
 #include <math.h>
 #include <stdio.h>
@@ -158,6 +162,127 @@ static bool measure(double rms[LAWS + 1], const alb_sh_law *laws, double k, alb_
     return true;
 }
 
+// Objects of another kind than the fit's: meshes, seen by rays.
+enum { MESHES = 4, SIDES = 40, RINGS = 64, TURNS = 128 };
+static const char *const mesh_names[MESHES] = {"animal", "animal in gallop", "plate", "vase"};
+
+static bool make_mesh(alb_mesh *mesh, int which, alb_error *error)
+{
+    const alb_vector origin = {0, 0, 0};
+    const double vase[][2] = {{0, 0}, {20, 0}, {35, 30}, {12, 70}, {22, 90}, {18, 90}, {9, 70}, {30, 30}, {0, 5}};
+    switch (which) {
+    case 0:
+        return animal_add(mesh, origin, 4, 0, 0, error);
+    case 1:
+        return animal_gallop_add(mesh, origin, 4, 0.4, 0, error);
+    case 2:
+        return shape_sheet(mesh, origin, (alb_vector){60, 0, 0}, (alb_vector){0, 40, 0}, 1, 1, 0, error);
+    default:
+        return shape_lathe(mesh, vase, sizeof vase / sizeof *vase, origin, 4, 0, error);
+    }
+}
+
+// The middle of the box around, and the distance of the farthest corner of a face from there.
+static double bounding_sphere(alb_vector *centre, const alb_mesh *mesh)
+{
+    alb_vector low = mesh->vertices[0], high = low;
+    double radius = 0;
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        const alb_vector v = mesh->vertices[i];
+        low = (alb_vector){fmin(low.x, v.x), fmin(low.y, v.y), fmin(low.z, v.z)};
+        high = (alb_vector){fmax(high.x, v.x), fmax(high.y, v.y), fmax(high.z, v.z)};
+    }
+    *centre = alb_times(0.5, alb_add(low, high));
+    for (size_t i = 0; i < mesh->vertex_count; i++)
+        radius = fmax(radius, alb_length(alb_sub(mesh->vertices[i], *centre)));
+    return radius;
+}
+
+// Occlusion at `distance` radii from the centre in direction -axis, in the frame (across, over, axis), by rays evenly
+// in the cone that holds the bounding sphere.
+static void mesh_occlusion(double coefficients[COUNT], const alb_tracer *tracer, alb_vector centre, double radius,
+                           double distance, const alb_vector frame[3])
+{
+    const double far = distance * radius, open = 1 - sqrt(1 - 1 / (distance * distance));
+    const alb_vector from = alb_sub(centre, alb_times(far, frame[2]));
+    memset(coefficients, 0, COUNT * sizeof *coefficients);
+    for (int i = 0; i < RINGS * TURNS; i++) {
+        const double c = 1 - open * ((i / TURNS) + 0.5) / RINGS, s = sqrt(1 - c * c),
+                     turn = 2 * M_PI * (i % TURNS + 0.5) / TURNS;
+        const alb_vector local = {s * cos(turn), s * sin(turn), c};
+        const alb_vector across = alb_add(alb_times(local.x, frame[0]), alb_times(local.y, frame[1]));
+        const alb_vector ray = alb_add(across, alb_times(c, frame[2]));
+        alb_hit hit;
+        double values[COUNT];
+        if (!alb_tracer_closest(&hit, tracer, from, ray))
+            continue;
+        alb_sh_evaluate(values, ORDER, local);
+        for (int v = 0; v < COUNT; v++)
+            coefficients[v] += 2 * M_PI * open / (RINGS * TURNS) * values[v];
+    }
+}
+
+// An axis at random and two at right angles to it.
+static void random_frame(alb_vector frame[3], uint64_t index)
+{
+    alb_random random = alb_random_at(3, 0, index);
+    const double c = 2 * alb_random_uniform(&random) - 1, s = sqrt(1 - c * c),
+                 turn = 2 * M_PI * alb_random_uniform(&random);
+    frame[2] = (alb_vector){s * cos(turn), s * sin(turn), c};
+    alb_tangents(&frame[0], &frame[1], frame[2]);
+}
+
+static bool measure_mesh(int which, alb_error *error)
+{
+    const alb_sh_law laws[3] = {{ALB_SH_LAW_VISIBILITY, ALB_SH_MAP_CONE, 45, 4, 4},
+                                {ALB_SH_LAW_OCCLUSION, ALB_SH_MAP_CONE, 45, 4, 4},
+                                {ALB_SH_LAW_REGRESSED, ALB_SH_MAP_CONE, 45, 4, 4}};
+    static const double ratios[] = {1.3, 2, 4, 8, 100, 1000};
+    alb_mesh mesh = {0};
+    alb_tracer tracer = {0};
+    alb_vector centre;
+    bool ok = make_mesh(&mesh, which, error) && alb_tracer_create(&tracer, &mesh, error);
+    const double radius = ok ? bounding_sphere(&centre, &mesh) : 1;
+    for (size_t n = 0; n < sizeof ratios / sizeof *ratios && ok; n++) {
+        double squares[SIDES][4] = {{0}}, rms[4] = {0};
+        alb_sh_scaling m[3];
+        for (int law = 0; law < 3 && ok; law++)
+            ok = alb_sh_law_at(&m[law], &laws[law], ratios[n], error);
+#pragma omp parallel for
+        for (int side = 0; side < SIDES; side++) {
+            alb_vector frame[3];
+            double sample[COUNT], truth[COUNT], found[COUNT];
+            random_frame(frame, (uint64_t)side);
+            mesh_occlusion(sample, &tracer, centre, radius, sample_distance, frame);
+            mesh_occlusion(truth, &tracer, centre, radius, sample_distance * ratios[n], frame);
+            for (int law = 0; law < 3; law++) {
+                alb_sh_scaling_apply(found, &m[law], sample);
+                squares[side][law] = norm(found, truth);
+            }
+            squares[side][3] = norm(truth, NULL);
+        }
+        printf("%-18s %8g", n ? "" : mesh_names[which], ratios[n]);
+        for (int i = 0; i < 4; i++) {
+            for (int side = 0; side < SIDES; side++)
+                rms[i] += squares[side][i] / SIDES;
+            printf(" %12.3g", sqrt(rms[i]));
+        }
+        printf("\n");
+    }
+    alb_tracer_free(&tracer);
+    alb_mesh_free(&mesh);
+    return ok;
+}
+
+static bool measure_meshes(alb_error *error)
+{
+    printf("\n%-18s %8s %12s %12s %12s %12s\n", "meshes", "k", "as printed", "windowed", "regressed", "left out");
+    for (int which = 0; which < MESHES; which++)
+        if (!measure_mesh(which, error))
+            return false;
+    return true;
+}
+
 static bool chart(const char *path, alb_error *error)
 {
     const alb_sh_law laws[LAWS] = {{ALB_SH_LAW_VISIBILITY, ALB_SH_MAP_CONE, 45, 4, 4},
@@ -173,7 +298,7 @@ static bool chart(const char *path, alb_error *error)
         printf(" %22s", labels[i]);
     const double named[] = {1.3, 2, 4, 8};
     for (int j = 0; j < DISTANCES + 4; j++) {
-        const double at = j < 4 ? named[j] : exp(log(1000) * (j - 4) / (DISTANCES - 1));
+        const double at = j < 4 ? named[j] : 1.05 * pow(1000 / 1.05, (j - 4.) / (DISTANCES - 1));
         if (!measure(rms, laws, at, error))
             return false;
         printf("\n%8.3g", at);
@@ -214,7 +339,7 @@ int main(int argc, char **argv)
             off = fmaxf(off, fabsf(coefficients[j][v] - alb_sh_regress_coefficients[j][v]));
     if (ok)
         printf("refitted: coefficients differ from those of the library by %.1e at most\n", (double)off);
-    if (!ok || !chart(argc > 1 ? argv[1] : NULL, &error)) {
+    if (!ok || !chart(argc > 1 ? argv[1] : NULL, &error) || !measure_meshes(&error)) {
         fprintf(stderr, "bench.sh_regress: %s\n", error.text);
         return error.status;
     }

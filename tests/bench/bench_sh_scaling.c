@@ -202,7 +202,7 @@ static bool measure_batches(const receivers *all, alb_error *error)
                 best[1] = fmin(best[1], alb_clock_s() - start_s);
                 off = run ? off : receiver_error(all, &law, error);
                 start_s = alb_clock_s();
-                alb_sh_batch_apply(all->out, &batch, all->k, all->in, all->stride, all->count);
+                alb_sh_batch_apply(all->out, &batch, false, all->k, all->in, all->stride, all->count);
                 best[0] = fmin(best[0], alb_clock_s() - start_s);
             }
             printf("order %d to 4, %3d cells, %6zu bytes %14.1f %12.1e\n", in_order, cells,

@@ -184,8 +184,8 @@ static bool create_egg(alb_scene *scene, int frame, alb_error *error)
         close_object(scene, false), next_object(scene);
     const alb_vector hinge = {90 * cos(2 * M_PI * phase) - 40, -60, 260}, up = {0, 120, 0}; // fronts face down
     const alb_vector leaf[2] = {{90 * cos(fold), 0, -90 * sin(fold)}, {-90 * cos(fold), 0, -90 * sin(fold)}};
-    ok = ok && shape_sheet(&scene->mesh, hinge, up, leaf[0], 8, 6, 2, error) &&
-         shape_sheet(&scene->mesh, hinge, leaf[1], up, 6, 8, 3, error);
+    ok = ok && shape_sheet(&scene->mesh, hinge, up, leaf[0], 2, 2, 2, error) &&
+         shape_sheet(&scene->mesh, hinge, leaf[1], up, 2, 2, 3, error);
     return finish(ok, scene);
 }
 
@@ -232,16 +232,16 @@ static alb_vector pot_ring(const void *context, double along, double around)
 static alb_vector spout_ring(const void *context, double along, double around)
 {
     (void)context;
-    const double angle = -2 * M_PI * around, r = 15 - 8 * along;
-    return (alb_vector){50 + 55 * along + r * 0.6 * cos(angle), r * sin(angle),
-                        38 + 50 * along * along + r * cos(angle) * 0.8};
+    const double angle = -2 * M_PI * around, r = 14 - 7 * along, slope = atan2(100 * along, 55);
+    return (alb_vector){50 + 55 * along - r * cos(angle) * sin(slope), r * sin(angle),
+                        38 + 50 * along * along + r * cos(angle) * cos(slope)};
 }
 
 static alb_vector handle_ring(const void *context, double along, double around)
 {
     (void)context;
     const double angle = -2 * M_PI * around, bow = M_PI * (along - 0.5), r = 6;
-    return (alb_vector){-52 - (38 + r * cos(angle)) * cos(bow), r * sin(angle), 50 + (30 + r * cos(angle)) * sin(bow)};
+    return (alb_vector){-40 - (50 + r * cos(angle)) * cos(bow), r * sin(angle), 50 + (30 + r * cos(angle)) * sin(bow)};
 }
 
 static bool create_teapot(alb_scene *scene, int frame, alb_error *error)

@@ -1,0 +1,245 @@
+// Shadow fields on the four animated scenes: frames a second by stages beside those of Wang et al. 2006, and error
+// against time beside casting rays. Prints both tables and draws the chart: bench.shadow CHART.svg [frames, 20]
+//
+// A frame: the meshes are given; spheres and pictures of all that moves, every vertex lit. Error: rms of the irradiance
+// over 2000 vertices (not of lights, not inside others) against 4096 rays each, in percent of the mean, worst of three
+// frames. Rays are cast from the same vertices; their time is for all of them, one core's share of the machine as for
+// the fields.
+#include "base/plot.h"
+#include "base/progress.h"
+#include "base/random.h"
+#include "render/shadow_rays.h"
+#include "render/shadow_stage.h"
+#include "scenes/shadow_scenes.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SAMPLES = 2000, WAYS = 6, RAYS = 4, CHECKED = 3 };
+
+static const struct {
+    const char *name;
+    bool paper;
+    int order, outer, inner, cells, pixels;
+    double cluster;
+} ways[WAYS] = {{"as printed", true, 4, 1, 0, 8, 32, 0},   {"windowed", false, 4, 1, 0, 8, 64, 0.04},
+                {"2 shells", false, 4, 2, 0, 8, 64, 0.04}, {"order 8 to 4", false, 8, 1, 0, 8, 64, 0.04},
+                {"4 shells", false, 4, 2, 2, 8, 64, 0.04}, {"4 shells, order 8", false, 8, 2, 2, 12, 64, 0.02}};
+static const int strata[RAYS] = {4, 8, 16, 32};
+
+typedef struct result {
+    double ms, sampling_ms, scaling_ms, products_ms, error_percent, model_percent;
+} result;
+
+typedef struct truth {
+    size_t count, vertices[SAMPLES];
+    alb_vector points[SAMPLES], normals[SAMPLES];
+    float irradiance[SAMPLES][3];
+    alb_tracer tracer;
+    float (*radiance)[3];
+} truth;
+
+static alb_shadow_stage stage_of(int way)
+{
+    alb_shadow_stage stage = {.settings = alb_shadow_defaults, .paper = ways[way].paper};
+    stage.settings.order = ways[way].order;
+    stage.settings.outer = ways[way].outer;
+    stage.settings.inner = ways[way].inner;
+    stage.settings.cells = ways[way].cells;
+    stage.settings.pixels = ways[way].pixels;
+    stage.settings.cluster = ways[way].cluster;
+    return stage;
+}
+
+static bool in_light(const alb_shadow_stage *stage, const alb_scene *scene, size_t vertex)
+{
+    for (size_t i = stage->occluder_count; i < stage->occluder_count + stage->light_count; i++) {
+        const alb_object *o = &scene->objects[stage->objects[i]];
+        if (vertex >= o->first_vertex && vertex - o->first_vertex < o->vertex_count)
+            return true;
+    }
+    return false;
+}
+
+static bool find_truth(truth *t, const alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
+{
+    alb_mesh casters = {0};
+    bool ok = (t->radiance = calloc(scene->mesh.face_count, sizeof *t->radiance)) != NULL;
+    for (size_t v = 0; ok && v < scene->mesh.vertex_count; v++)
+        ok = alb_mesh_add_vertex(&casters, scene->mesh.vertices[v], error);
+    for (size_t f = 0; ok && f < scene->mesh.face_count; f++) {
+        const uint32_t *v = scene->mesh.faces[f];
+        if (v[0] < scene->objects[0].vertex_count) // the ground casts nothing
+            continue;
+        const size_t count = casters.face_count;
+        ok = alb_mesh_add_face(&casters, v[0], v[1], v[2], 0, error);
+        for (int c = 0; c < 3 && casters.face_count > count; c++)
+            t->radiance[count][c] = (float)(scene->surfaces[scene->mesh.groups[f]].exitance[c] / M_PI);
+    }
+    ok = ok && alb_tracer_create(&t->tracer, &casters, error);
+    alb_mesh_free(&casters);
+    alb_random random = alb_random_at(3, 1, 0);
+    for (t->count = 0; ok && t->count < SAMPLES;) {
+        const size_t v = (size_t)(alb_random_uniform(&random) * (double)scene->mesh.vertex_count);
+        if (in_light(stage, scene, v) ||
+            alb_shadow_buried(&t->tracer, scene->mesh.vertices[v], stage->normals[v], 256 * t->tracer.slack_mm))
+            continue;
+        t->vertices[t->count] = v;
+        t->points[t->count] = scene->mesh.vertices[v];
+        t->normals[t->count++] = stage->normals[v];
+    }
+    if (ok)
+        alb_shadow_cast(t->irradiance, &t->tracer, (const float(*)[3])t->radiance, scene->lights, scene->light_count,
+                        t->points, t->normals, t->count, 64, 256 * t->tracer.slack_mm, 1);
+    return ok;
+}
+
+static void free_truth(truth *t)
+{
+    alb_tracer_free(&t->tracer);
+    free(t->radiance);
+}
+
+// Of all, or of the vertices of the model alone.
+static double error_of(const truth *t, const float (*found)[3], size_t ground, bool model)
+{
+    double sum = 0, mean = 0;
+    size_t count = 0;
+    for (size_t n = 0; n < t->count; n++) {
+        if (model && t->vertices[n] < ground)
+            continue;
+        for (int c = 0; c < 3; c++) {
+            sum += pow((double)(found[n][c] - t->irradiance[n][c]), 2);
+            mean += (double)t->irradiance[n][c];
+        }
+        count += 3;
+    }
+    return count ? 100 * sqrt(sum / (double)count) / (mean / (double)count) : 0;
+}
+
+static bool run_way(result *out, int scene_index, int way, int frames, alb_error *error)
+{
+    const shadow_scene *which = &shadow_scenes[scene_index];
+    alb_shadow_stage stage = stage_of(way);
+    double *times = calloc((size_t)frames, sizeof *times);
+    bool ok = times != NULL;
+    *out = (result){0};
+    for (int n = -1; ok && n < frames; n++) {
+        alb_scene scene;
+        const int frame = (n + 1) * which->frames / (frames + 1);
+        if (!which->create(&scene, frame, error)) {
+            ok = false;
+            break;
+        }
+        const double start_s = alb_clock_s();
+        ok = alb_shadow_stage_light(&stage, &scene, error);
+        if (n >= 0) { // the first makes the tables and fields
+            times[n] = alb_clock_s() - start_s;
+            const double share = stage.light_s / (stage.seconds.scaling + stage.seconds.products) / frames;
+            out->sampling_ms += 1e3 * stage.sampling_s / frames;
+            out->scaling_ms += 1e3 * share * stage.seconds.scaling;
+            out->products_ms += 1e3 * share * stage.seconds.products;
+        }
+        if (ok && n >= 0 && n % ((frames + CHECKED - 1) / CHECKED) == 0) {
+            static truth t;
+            static float found[SAMPLES][3];
+            ok = find_truth(&t, &stage, &scene, error);
+            for (size_t i = 0; ok && i < t.count; i++)
+                memcpy(found[i], stage.irradiance[t.vertices[i]], sizeof found[i]);
+            const size_t ground = scene.objects[0].vertex_count;
+            out->error_percent = fmax(out->error_percent, error_of(&t, (const float(*)[3])found, ground, false));
+            out->model_percent = fmax(out->model_percent, error_of(&t, (const float(*)[3])found, ground, true));
+            free_truth(&t);
+        }
+        alb_scene_free(&scene);
+    }
+    for (int i = 0; ok && i < frames; i++) // the median
+        for (int k = i + 1; k < frames; k++)
+            if (times[k] < times[i]) {
+                const double swap = times[i];
+                times[i] = times[k], times[k] = swap;
+            }
+    out->ms = ok ? 1e3 * times[frames / 2] : 0;
+    free(times);
+    alb_shadow_stage_free(&stage);
+    return ok;
+}
+
+static bool run_rays(double *ms, double *percent, int scene_index, alb_error *error)
+{
+    const shadow_scene *which = &shadow_scenes[scene_index];
+    alb_scene scene;
+    alb_shadow_stage stage = stage_of(1);
+    static truth t;
+    static float found[SAMPLES][3];
+    bool ok = which->create(&scene, which->frames / 6, error) && alb_shadow_stage_light(&stage, &scene, error) &&
+              find_truth(&t, &stage, &scene, error);
+    for (int k = 0; ok && k < RAYS; k++) {
+        const double start_s = alb_clock_s();
+        alb_shadow_cast(found, &t.tracer, (const float(*)[3])t.radiance, scene.lights, scene.light_count, t.points,
+                        t.normals, t.count, strata[k], 256 * t.tracer.slack_mm, 77);
+        ms[k] = 1e3 * (alb_clock_s() - start_s) * (double)scene.mesh.vertex_count / (double)t.count;
+        percent[k] = error_of(&t, (const float(*)[3])found, 0, false);
+        printf("%-8s %4d rays          %9.1f ms   %6.2f %%\n", which->name, strata[k] * strata[k], ms[k], percent[k]);
+    }
+    free_truth(&t);
+    alb_shadow_stage_free(&stage);
+    alb_scene_free(&scene);
+    return ok;
+}
+
+static bool chart(const char *path, double (*ms)[WAYS], double (*percent)[WAYS], double (*ray_ms)[RAYS],
+                  double (*ray_percent)[RAYS], alb_error *error)
+{
+    alb_curve curves[SHADOW_SCENES][2];
+    alb_panel panels[SHADOW_SCENES];
+    char titles[SHADOW_SCENES][160];
+    for (int i = 0; i < SHADOW_SCENES; i++) {
+        snprintf(titles[i], sizeof titles[i],
+                 "%s (as printed, windowed, 2 shells, order 8, 4 shells, 4 shells order 8)", shadow_scenes[i].what);
+        curves[i][0] = (alb_curve){
+            .label = "shadow fields", .x = ms[i], .y = percent[i], .count = WAYS, .mark = ALB_MARK_LINE_AND_POINTS};
+        curves[i][1] = (alb_curve){.label = "16 to 1024 rays",
+                                   .x = ray_ms[i],
+                                   .y = ray_percent[i],
+                                   .count = RAYS,
+                                   .mark = ALB_MARK_LINE_AND_POINTS};
+        panels[i] = (alb_panel){.title = titles[i],
+                                .x_label = i == SHADOW_SCENES - 1 ? "ms a frame" : NULL,
+                                .y_label = "error, %",
+                                .log_x = true,
+                                .log_y = true,
+                                .curves = curves[i],
+                                .curve_count = 2,
+                                .height = 1};
+    }
+    return alb_plot_write(path, panels, SHADOW_SCENES, 800, 1100, error);
+}
+
+int main(int argc, char **argv)
+{
+    alb_error error = {0};
+    const int frames = argc > 2 ? atoi(argv[2]) : 20;
+    static double ms[SHADOW_SCENES][WAYS], percent[SHADOW_SCENES][WAYS], ray_ms[SHADOW_SCENES][RAYS],
+        ray_percent[SHADOW_SCENES][RAYS];
+    bool ok = frames >= CHECKED && frames <= 60;
+    printf("%-8s %-17s %8s %8s %9s %9s %8s %8s %10s %10s\n", "scene", "", "sampling", "scaling", "products",
+           "frame, ms", "frames/s", "paper", "error, %", "on model");
+    for (int i = 0; ok && i < SHADOW_SCENES; i++)
+        for (int w = 0; ok && w < WAYS; w++) {
+            result r;
+            ok = run_way(&r, i, w, frames, &error);
+            ms[i][w] = r.ms, percent[i][w] = r.error_percent;
+            printf("%-8s %-17s %8.2f %8.2f %9.2f %9.2f %8.1f %8.1f %10.2f %10.2f\n", shadow_scenes[i].name,
+                   ways[w].name, r.sampling_ms, r.scaling_ms, r.products_ms, r.ms, 1e3 / r.ms,
+                   shadow_scenes[i].paper_fps, r.error_percent, r.model_percent);
+            fflush(stdout);
+        }
+    for (int i = 0; ok && i < SHADOW_SCENES; i++)
+        ok = run_rays(ray_ms[i], ray_percent[i], i, &error);
+    if (ok && argc > 1)
+        ok = chart(argv[1], ms, percent, ray_ms, ray_percent, &error);
+    if (!ok)
+        fprintf(stderr, "bench.shadow: %s\n", error.status ? error.text : "3 to 60 frames");
+    return ok ? 0 : 1;
+}
