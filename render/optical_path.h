@@ -33,8 +33,7 @@ typedef struct alb_optical_paths {
 } alb_optical_paths;
 
 // A place to go to: a patch of the body and a point on it or near it (its centroid, a part's centroid, the mean of a
-// cluster that the patch stands for). The path is that of the patch; its last leg ends at the point, which is right to
-// first order.
+// cluster that the patch stands for). The path is that of the patch, swung about its last corner to end at the point.
 typedef struct alb_optical_target {
     uint32_t patch;
     float x_mm, y_mm, z_mm;

@@ -8,10 +8,14 @@
 // path meets the edge). Elsewhere the corners of the path are then moved along the edges of the mesh on which they lie,
 // to where both sides meet the edge at one angle. What remains is second order in the angle between the plane and the
 // true path.
+//
+// Between places near by most surfaces hardly bend. The curve itself, just inside, is a path that bounds the shortest
+// one from above, as the chord does from below: where the two are alike the string about it needs no proof that it is
+// inside.
 #include "render/optical_solid.h"
 #include <string.h>
 
-enum { CROSSINGS = 48, POINTS = 1024, SWEEPS = 3 };
+enum { CROSSINGS = 48, POINTS = 1024, SWEEPS = 3, STEPS = 64 };
 // Detours beyond which corners are moved along their edges, and other planes are tried.
 static const double worth_moving = 1.02, worth_turning = 1.07;
 
@@ -33,6 +37,16 @@ static cut cut_at(const plane *p, alb_vector a, alb_vector b, double ha, double 
 {
     const alb_vector at = alb_sub(alb_add(a, alb_times(ha / (ha - hb), alb_sub(b, a))), p->origin);
     return (cut){.x = alb_dot(at, p->along), .y = alb_dot(at, p->up), .place = place};
+}
+
+// Into the triangle across the edge that is cut, and to where the section leaves that by one of its two other edges.
+static cut step(const plane *p, const alb_surface_net *net, uint32_t across)
+{
+    const uint32_t next = across / 3, came = across % 3, third = (came + 2) % 3, after = (came + 1) % 3;
+    const alb_vector *t = net->triangles[next], came_from = t[came], came_to = t[after];
+    const double h_from = height(p, came_from), h_to = height(p, came_to), hc = height(p, t[third]);
+    return (hc >= 0) == (h_from >= 0) ? cut_at(p, came_to, t[third], h_to, hc, 3 * next + after)
+                                      : cut_at(p, t[third], came_from, hc, h_from, 3 * next + third);
 }
 
 static int entry_of(const alb_crossing *crossings, size_t count, uint32_t triangle)
@@ -67,17 +81,10 @@ static int follow(cut *cuts, int *cut_count, int curve, const alb_surface_net *n
         const uint32_t across = net->neighbours[best.place / 3][best.place % 3];
         if (across == UINT32_MAX)
             return -1;
-        const uint32_t next = across / 3, came = across % 3;
-        const int entry = entry_of(crossings, crossing_count, next);
+        const int entry = entry_of(crossings, crossing_count, across / 3);
         if (entry >= 0)
             return entry;
-        // One of the two other edges, from the corner opposite.
-        t = net->triangles[next];
-        const uint32_t third = (came + 2) % 3, after = (came + 1) % 3;
-        const alb_vector came_from = t[came], came_to = t[after];
-        const double h_from = height(p, came_from), h_to = height(p, came_to), hc = height(p, t[third]);
-        best = (hc >= 0) == (h_from >= 0) ? cut_at(p, came_to, t[third], h_to, hc, 3 * next + after)
-                                          : cut_at(p, t[third], came_from, hc, h_from, 3 * next + third);
+        best = step(p, net, across);
     }
     return -1;
 }
@@ -125,6 +132,61 @@ static int tighten(cut *cuts, int count, double length)
             cuts[kept++] = cuts[i];
     }
     return kept;
+}
+
+static double norm(double x, double y) { return sqrt(x * x + y * y); }
+
+// Where the section leaves the triangle forwards; of no place where it does not cross it.
+static cut leave(const plane *p, const alb_surface_net *net, uint32_t triangle)
+{
+    const alb_vector *t = net->triangles[triangle];
+    const double heights[3] = {height(p, t[0]), height(p, t[1]), height(p, t[2])};
+    cut furthest = {.place = UINT32_MAX};
+    for (int k = 0; k < 3; k++) {
+        const double ha = heights[k], hb = heights[(k + 1) % 3];
+        if ((ha >= 0) == (hb >= 0))
+            continue;
+        const cut found = cut_at(p, t[k], t[(k + 1) % 3], ha, hb, 3 * triangle + (uint32_t)k);
+        if (furthest.place == UINT32_MAX || found.x > furthest.x)
+            furthest = found;
+    }
+    return furthest;
+}
+
+static double taut_length(const cut *hull, int kept, double length)
+{
+    double x = 0, y = 0, sum = 0;
+    for (int i = 0; i < kept; i++) {
+        sum += norm(hull[i].x - x, hull[i].y - y);
+        x = hull[i].x, y = hull[i].y;
+    }
+    return sum + norm(length - x, y);
+}
+
+bool alb_slice_along(double *length_mm, const alb_surface_net *net, uint32_t from, uint32_t to, double most_mm)
+{
+    const alb_vector start = net->middles[from], chord = alb_sub(net->middles[to], start),
+                     inwards = alb_times(-1, alb_add(net->normals[from], net->normals[to]));
+    const double whole = alb_length(chord);
+    plane p = {.origin = start, .along = alb_unit(chord)};
+    p.up = alb_unit(alb_sub(inwards, alb_times(alb_dot(inwards, p.along), p.along)));
+    p.normal = alb_cross(p.along, p.up);
+    cut cuts[STEPS], at = leave(&p, net, from);
+    double x = 0, y = 0, length = 0;
+    for (int count = 0; count < STEPS && at.place != UINT32_MAX; count++) {
+        length += norm(at.x - x, at.y - y);
+        const uint32_t across = net->neighbours[at.place / 3][at.place % 3];
+        if (across == UINT32_MAX || !(length + norm(whole - at.x, at.y) <= most_mm))
+            return false;
+        x = at.x, y = at.y;
+        cuts[count] = at;
+        if (across / 3 == to) {
+            *length_mm = taut_length(cuts, tighten(cuts, count + 1, whole), whole);
+            return true;
+        }
+        at = step(&p, net, across);
+    }
+    return false;
 }
 
 static double root_of(double x) { return x > 0 ? sqrt(x) : 0; }

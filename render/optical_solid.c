@@ -11,6 +11,9 @@
 // A section that is longer than this times its chord is compared with the graph's path; and how much longer than the
 // section that may be before it is pulled, for pulling to gain so much is rare.
 static const double trusted_detour = 1.2, worth_pulling = 1.15;
+// Surfaces that bend by less, with curves that are longer than the chord by less, are followed and not looked into.
+static const double flat_cosine = 0.85, flat_detour = 1.02;
+static const double true_corner = 0.3; // radians
 enum { VOXELS_MOST = 6000000, VOXELS_LEAST = 20000, VOXELS_A_PATCH = 100, TOUCHES = 16 };
 
 static bool fill_starts(alb_optical_solid *solid, alb_error *error)
@@ -127,14 +130,44 @@ static bool only_touches(const alb_optical_solid *solid, alb_vector start, alb_v
     return inside > 0 && out * alb_length(alb_sub(end, start)) < 4 * solid->lift_mm;
 }
 
+// Whether the surface leads from one triangle to the other almost straight, and how far.
+static bool is_near_flat(double *length_mm, const alb_surface_net *net, uint32_t from, uint32_t to)
+{
+    const double chord = alb_length(alb_sub(net->middles[to], net->middles[from]));
+    return alb_dot(net->normals[from], net->normals[to]) >= flat_cosine &&
+           alb_slice_along(length_mm, net, from, to, flat_detour * chord);
+}
+
+static alb_vector leg(const alb_bends *path, int i) { return alb_sub(path->at[i + 1], path->at[i]); }
+
+// The length of the path with another end, near by: the path swings about its last true corner, unfolded from there on
+// into a straight line. Bends as over a round edge, slight one by one and together, are none.
+static double swing(const alb_bends *path, alb_vector end, alb_vector point)
+{
+    int i = path->count - 2;
+    double after = alb_length(leg(path, i)), turned = 0;
+    const alb_vector last = alb_unit(leg(path, i));
+    for (; i > 0; i--) {
+        const alb_vector before = leg(path, i - 1), next = leg(path, i);
+        turned += atan2(alb_length(alb_cross(before, next)), alb_dot(before, next));
+        if (!(turned < true_corner))
+            break;
+        after += alb_length(leg(path, i - 1));
+    }
+    return fmax(path->length_mm - after, 0) + alb_length(alb_add(alb_times(after, last), alb_sub(point, end)));
+}
+
 double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *solid, uint32_t from, uint32_t to,
                                  alb_vector point)
 {
-    const alb_vector start = solid->starts[from], end = solid->starts[to], middle = solid->net.middles[to];
-    if (from == to || alb_voxels_inside(&solid->voxels, start, end) || only_touches(solid, start, end))
-        return alb_length(alb_sub(point, solid->net.middles[from]));
+    const alb_vector start = solid->starts[from], end = solid->starts[to], source = solid->net.middles[from],
+                     middle = solid->net.middles[to];
     alb_bends path;
+    double length;
+    if (from != to && is_near_flat(&length, &solid->net, from, to))
+        return alb_length(alb_add(alb_times(length, alb_unit(alb_sub(middle, source))), alb_sub(point, middle)));
+    if (from == to || alb_voxels_inside(&solid->voxels, start, end) || only_touches(solid, start, end))
+        return alb_length(alb_sub(point, source));
     go_around(&path, search, solid, solid->turns.of_triangle[from], solid->turns.of_triangle[to], start, end);
-    const alb_vector last = path.at[path.count - 2];
-    return path.length_mm - alb_length(alb_sub(middle, last)) + alb_length(alb_sub(point, last));
+    return swing(&path, middle, point);
 }

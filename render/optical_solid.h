@@ -64,6 +64,10 @@ void alb_search_free(alb_search *search);
 bool alb_search_found(const alb_search *search, uint32_t node);
 void alb_search_run(alb_search *search, const alb_optical_solid *solid, uint32_t source);
 
+// From the middle of one triangle to that of another along the curve in the plane through both that holds the sum of
+// their normals: how long a string is, drawn tight about it. False where the curve does not lead there or is longer
+// than most_mm.
+bool alb_slice_along(double *length_mm, const alb_surface_net *net, uint32_t from, uint32_t to, double most_mm);
 // The shortest path from one point to another in the half plane through both that `towards` points into, along the
 // surface where the chord leaves the body. False where the surface does not lead back to the chord, or leads through
 // another part of the outside.

@@ -20,10 +20,10 @@ typedef struct alb_relight {
 
 enum { ALB_RELIGHT_RANK_MAX = 512 };
 
-// Made of 2 rank solutions: about 15 rank products with S'F. rank: 1..ALB_RELIGHT_RANK_MAX and at most the number of
+// Made of 2 rank solutions: about 6 rank products with S'F. rank: 1..ALB_RELIGHT_RANK_MAX and at most the number of
 // patches, rounded up to whole eights. The error is stated from spots and points of light at random places, each solved
-// to 1e-4. ALB_BAD_DATA for a rank out of range; else it fails as solutions do. After the materials change, make it
-// anew.
+// to 1e-4; under a sky it is two or three times that. ALB_BAD_DATA for a rank out of range; else it fails as solutions
+// do. After the materials change, make it anew.
 bool alb_relight_create(alb_relight *relight, alb_radiosity *equations, const alb_patches *patches, int rank,
                         bool exact_bounce, uint64_t seed, alb_error *error);
 void alb_relight_free(alb_relight *relight);

@@ -38,7 +38,8 @@ typedef struct alb_sh_map_point {
 bool alb_sh_map_cone(alb_sh_map *map, double k, double alpha_deg, alb_error *error);
 // tau = theta - asin(k sin theta), -1 < k < 1: on and outside the environment's sphere there is no such map.
 bool alb_sh_map_midrange(alb_sh_map *map, double k, alb_error *error);
-// tau = asin(k sin theta) for theta < asin(min(1, 1/k)): occlusion only, nothing is seen beyond (windowed). k as for the cone.
+// tau = asin(k sin theta) for theta < asin(min(1, 1/k)): occlusion only, nothing is seen beyond (windowed). k as for
+// the cone.
 bool alb_sh_map_sphere(alb_sh_map *map, double k, alb_error *error);
 // The caller's own function, which must be continuous and rise; borrowed with its context.
 void alb_sh_map_custom(alb_sh_map *map, alb_sh_tau *tau, const void *context);

@@ -32,7 +32,7 @@ bool alb_sh_table_at(alb_sh_scaling *scaling, const alb_sh_table *table, double 
 size_t alb_sh_table_bytes(const alb_sh_table *table);
 
 // The cone map's M of both measures at `count` k, which rise and lie in [1/16, 16]: visibility[i * values + v],
-// energy likewise, values = alb_sh_scaling_count(order, order), order 1 to 8. Within 1e-6 (order 4, alpha 30 to 60:
-// 5e-7). 40 k of order 4 take some 20 us. ALB_USAGE where k, alpha or order are out of bounds.
+// energy likewise, values = alb_sh_scaling_count(order, order), order 1 to 8. Within 1e-6.
+// 40 k of order 4 take some 35 us at alpha 45. ALB_USAGE where k, alpha or order are out of bounds.
 bool alb_sh_table_cone(float *visibility, float *energy, const double *k, int count, double alpha_deg, int order,
                        alb_error *error);

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LANES = 8, NODES_MAX = 256, LEGENDRES = ALB_SH_ORDER_MAX * (ALB_SH_ORDER_MAX + 1) / 2, VALUES_MAX = 204 };
+enum { LANES = 8, NODES_MAX = 384, LEGENDRES = ALB_SH_ORDER_MAX * (ALB_SH_ORDER_MAX + 1) / 2, VALUES_MAX = 204 };
 typedef double lanes[LANES];
 #define INLINE static inline __attribute__((always_inline))
 

@@ -298,7 +298,7 @@ static bool chart(const char *path, alb_error *error)
         printf(" %22s", labels[i]);
     const double named[] = {1.3, 2, 4, 8};
     for (int j = 0; j < DISTANCES + 4; j++) {
-        const double at = j < 4 ? named[j] : exp(log(1000) * (j - 4) / (DISTANCES - 1));
+        const double at = j < 4 ? named[j] : 1.05 * pow(1000 / 1.05, (j - 4.) / (DISTANCES - 1));
         if (!measure(rms, laws, at, error))
             return false;
         printf("\n%8.3g", at);
