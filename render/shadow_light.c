@@ -56,14 +56,27 @@ static void set_cosine(block *b)
                 b->cosine[(size_t)i * BLOCK + r] *= (float)lobe[l];
 }
 
+// Where receivers look the field up: from within its sphere a tenth of the radius above their surface, for the nodes
+// around lie partly below it, where all is dark.
+static void look_up_above(alb_vector *points, const block *b, const alb_shadow_sphere *sphere)
+{
+    for (size_t r = 0; r < b->count; r++) {
+        const double x = alb_length(alb_sub(b->points[r], sphere->centre_mm)) / sphere->radius_mm;
+        const double rise_mm = 0.1 * sphere->radius_mm * fmin(fmax(4 * (1 - x), 0), 1);
+        points[r] = alb_add(b->points[r], alb_times(rise_mm, b->normals[r]));
+    }
+}
+
 static void find_occlusions(block *b, const alb_shadow_world *world)
 {
+    alb_vector points[BLOCK];
     alb_shadow_receivers v;
     for (size_t o = 0; o < world->occluder_count; o++) {
         const alb_shadow_field *field = &world->occluders[o];
         const double radius = field->sphere.radius_mm;
         b->hides[o] = false;
-        alb_shadow_receivers_at(&v, field, b->points, b->count);
+        look_up_above(points, b, &field->sphere);
+        alb_shadow_receivers_at(&v, field, points, b->count);
         memcpy(b->distances_mm[o], v.distances_mm, sizeof v.distances_mm);
         for (size_t r = 0; r < b->count; r++) { // the height of the sphere's top above the horizon, in radii
             const double top = 1 - alb_dot(v.directions[r], b->normals[r]) * b->distances_mm[o][r] / radius;

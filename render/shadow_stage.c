@@ -81,8 +81,12 @@ static void free_fields(alb_shadow_stage *stage)
     free(stage->normals);
     free(stage->irradiance);
     const alb_shadow_stage kept = *stage;
-    *stage = (alb_shadow_stage){
-        .settings = kept.settings, .paper = kept.paper, .skies = kept.skies, .sky_count = kept.sky_count};
+    *stage = (alb_shadow_stage){.settings = kept.settings,
+                                .paper = kept.paper,
+                                .laws = kept.laws,
+                                .laws_order = kept.laws_order,
+                                .skies = kept.skies,
+                                .sky_count = kept.sky_count};
 }
 
 void alb_shadow_stage_free(alb_shadow_stage *stage)
