@@ -1,15 +1,17 @@
 // Shadow fields on the four animated scenes: frames a second by stages beside those of Wang et al. 2006, and error
-// against time beside casting rays. Prints both tables and draws the chart: bench.shadow CHART.svg [frames, 20]
+// against time beside casting rays. Prints both tables, draws the chart and, beside it as CHART.png, one frame of each:
+// bench.shadow CHART.svg [frames, 20]
 //
 // A frame: the meshes are given; spheres and pictures of all that moves, every vertex lit. Error: rms of the irradiance
 // over 2000 vertices (not of lights, not inside others) against 4096 rays each, in percent of the mean, worst of three
-// frames. Rays are cast from the same vertices; their time is for all of them, one core's share of the machine as for
-// the fields.
+// frames. Rays are cast from the same vertices on as many cores; their time is that of every vertex.
 #include "base/plot.h"
 #include "base/progress.h"
 #include "base/random.h"
+#include "render/shadow_picture.h"
 #include "render/shadow_rays.h"
 #include "render/shadow_stage.h"
+#include "render/view.h"
 #include "scenes/shadow_scenes.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -221,6 +223,37 @@ static bool chart(const char *path, double (*ms)[WAYS], double (*percent)[SHADOW
     return alb_plot_write(path, panels, SHADOW_SCENES, 800, 1100, error);
 }
 
+// A frame of each scene at half its size, two by two; the settings with 4 shells.
+static bool draw_frames(const char *chart_path, alb_error *error)
+{
+    char path[1024];
+    alb_image all = {0};
+    bool ok = alb_image_create(&all, 640, 480, "R,G,B", error);
+    for (int i = 0; ok && i < SHADOW_SCENES; i++) {
+        alb_scene scene;
+        alb_image picture = {0};
+        alb_shadow_stage stage = stage_of(4);
+        double brightest, exposure;
+        if (!shadow_scenes[i].create(&scene, 12, error))
+            break;
+        ok = alb_shadow_stage_light(&stage, &scene, error) &&
+             alb_shadow_view(&picture, &brightest, &scene, &stage, error) &&
+             alb_view_exposure(&exposure, &picture, brightest, error);
+        for (int n = 0; ok && n < 640 * 480; n++) // four pixels become one
+            for (int c = 0; c < 3; c++)
+                alb_image_at(&all, n % 640 / 2 + 320 * (i % 2), n / 640 / 2 + 240 * (i / 2))[c] +=
+                    0.25F * (float)exposure * alb_image_at(&picture, n % 640, n / 640)[c];
+        alb_image_free(&picture);
+        alb_shadow_stage_free(&stage);
+        alb_scene_free(&scene);
+    }
+    const size_t stem = strlen(chart_path) > 4 ? strlen(chart_path) - 4 : 0;
+    snprintf(path, sizeof path, "%.*s.png", (int)stem, chart_path);
+    ok = ok && alb_image_write_png(&all, 1, path, error);
+    alb_image_free(&all);
+    return ok;
+}
+
 int main(int argc, char **argv)
 {
     alb_error error = {0};
@@ -245,7 +278,7 @@ int main(int argc, char **argv)
     for (int i = 0; ok && i < SHADOW_SCENES; i++)
         ok = run_rays(ray_ms[i], ray_percent[i], i, &error);
     if (ok && argc > 1)
-        ok = chart(argv[1], ms, percent, ray_ms, ray_percent, &error);
+        ok = chart(argv[1], ms, percent, ray_ms, ray_percent, &error) && draw_frames(argv[1], &error);
     if (!ok)
         fprintf(stderr, "bench.shadow: %s\n", error.status ? error.text : "3 to 60 frames");
     return ok ? 0 : 1;
