@@ -19,7 +19,7 @@ const alb_shadow_settings alb_shadow_defaults = {
     .order = 4, .cells = 8, .pixels = 64, .distance = 1.1, .outer = 1, .rays = 512, .cluster = 0.04};
 const alb_shadow_settings alb_shadow_light_settings = {
     .order = 4, .cells = 8, .pixels = 40, .distance = 1.1, .outer = 6};
-const double alb_shadow_inner_radii[ALB_SHADOW_INNER_MAX] = {0.75, 0.5, 0.3},
+const double alb_shadow_inner_radii[ALB_SHADOW_INNER_MAX] = {0.85, 0.6, 0.4},
              alb_shadow_outer_ratios[ALB_SHADOW_OUTER_MAX] = {1, 1.4, 2, 3.2, 6, 12};
 
 typedef struct alb_shadow_work { // of one thread

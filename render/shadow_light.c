@@ -20,11 +20,12 @@
 #include "base/progress.h"
 #include "render/sh_product.h"
 #include "render/sh_rotate.h"
+#include "render/shadow_receivers.h"
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { BLOCK = 64, VALUES = ALB_SHADOW_VALUES, ORDER = ALB_SHADOW_ORDER };
+enum { BLOCK = ALB_SHADOW_BLOCK, VALUES = ALB_SHADOW_VALUES, ORDER = ALB_SHADOW_ORDER };
 static const double constant_one = 3.5449077018110318; // sqrt(4 pi)
 
 // A block of receivers, structures of arrays.
@@ -55,85 +56,15 @@ static void set_cosine(block *b)
                 b->cosine[(size_t)i * BLOCK + r] *= (float)lobe[l];
 }
 
-// What the samples of a field around a receiver are in its axis' frame: a place on a shell and k.
-typedef struct view {
-    float axes[3 * BLOCK], k[BLOCK], weights[BLOCK];
-    alb_vector directions[BLOCK]; // from the centre
-} view;
-
-static void look_at(view *v, double *distances_mm, const block *b, const alb_shadow_field *field)
-{
-    for (size_t r = 0; r < b->count; r++) {
-        const alb_vector off = alb_sub(b->points[r], field->sphere.centre_mm);
-        const double distance = alb_length(off);
-        const alb_vector d = distance > 0 ? alb_times(1 / distance, off) : (alb_vector){0, 0, 1};
-        v->directions[r] = d;
-        v->axes[r] = (float)-d.x, v->axes[BLOCK + r] = (float)-d.y, v->axes[2 * BLOCK + r] = (float)-d.z;
-        distances_mm[r] = distance;
-    }
-}
-
-// out += weight M(k) sample, in the axis' frame.
-static void add_scaled(float *out, const view *v, const alb_shadow_field *field, int shell, const alb_sh_batch *law,
-                       size_t count)
-{
-    const size_t values = (size_t)(field->settings.order * field->settings.order);
-    float samples[ALB_SH_COUNT_MAX * BLOCK], scaled[VALUES * BLOCK], one[ALB_SH_COUNT_MAX];
-    for (size_t r = 0; r < count; r++) {
-        alb_shadow_field_at(one, field, shell, v->directions[r]);
-        for (size_t i = 0; i < values; i++)
-            samples[i * BLOCK + r] = one[i];
-    }
-    alb_sh_to_axis_batch(samples, samples, field->settings.order, v->axes, BLOCK, count);
-    alb_sh_batch_apply(scaled, law, false, v->k, samples, BLOCK, count);
-    for (size_t i = 0; i < VALUES; i++)
-        for (size_t r = 0; r < count; r++)
-            out[i * BLOCK + r] += v->weights[r] * scaled[i * BLOCK + r];
-}
-
-// Between two shells both speak: the outer one by t^2, t the place between them in the logarithm of the distance, as
-// scaling outwards is the more accurate. Further out or in, the last one alone. Whether the shell has a say for any
-// receiver.
-static bool weigh(view *v, const double *distances_mm, const alb_shadow_field *field, int shell, size_t count)
-{
-    const double here = field->radii[shell], inner = shell > 0 ? field->radii[shell - 1] : 0;
-    const double outer = shell + 1 < field->shells ? field->radii[shell + 1] : 0;
-    bool any = false;
-    for (size_t r = 0; r < count; r++) {
-        const double x = distances_mm[r] / field->sphere.radius_mm;
-        double weight = 1;
-        if (x < here && shell > 0) {
-            const double t = x <= inner ? 0 : log(x / inner) / log(here / inner);
-            weight = t * t;
-        } else if (x > here && outer > 0) {
-            const double t = x >= outer ? 1 : log(x / here) / log(outer / here);
-            weight = 1 - t * t;
-        }
-        v->weights[r] = (float)weight;
-        v->k[r] = (float)(x / here);
-        any |= weight > 0;
-    }
-    return any;
-}
-
-static void find_occlusion(float *out, view *v, const double *distances_mm, const alb_shadow_field *field,
-                           const alb_shadow_laws *laws, size_t count)
-{
-    memset(out, 0, VALUES * BLOCK * sizeof *out);
-    for (int shell = 0; shell < field->shells; shell++)
-        if (weigh(v, distances_mm, field, shell, count))
-            add_scaled(out, v, field, shell, shell < field->settings.inner ? &laws->inner : &laws->outer, count);
-    alb_sh_from_axis_batch(out, out, ORDER, v->axes, BLOCK, count);
-}
-
 static void find_occlusions(block *b, const alb_shadow_world *world)
 {
-    view v;
+    alb_shadow_receivers v;
     for (size_t o = 0; o < world->occluder_count; o++) {
         const alb_shadow_field *field = &world->occluders[o];
         const double radius = field->sphere.radius_mm;
         b->hides[o] = false;
-        look_at(&v, b->distances_mm[o], b, field);
+        alb_shadow_receivers_at(&v, field, b->points, b->count);
+        memcpy(b->distances_mm[o], v.distances_mm, sizeof v.distances_mm);
         for (size_t r = 0; r < b->count; r++) { // the height of the sphere's top above the horizon, in radii
             const double top = 1 - alb_dot(v.directions[r], b->normals[r]) * b->distances_mm[o][r] / radius;
             b->shares[o][r] = (float)fmin(fmax(1 + 10 * top, 0), 1);
@@ -141,7 +72,7 @@ static void find_occlusions(block *b, const alb_shadow_world *world)
         }
         if (!b->hides[o])
             continue;
-        find_occlusion(b->occlusion[o], &v, b->distances_mm[o], field, world->laws, b->count);
+        alb_shadow_receivers_occlusion(b->occlusion[o], &v, field, world->laws);
     }
 }
 
@@ -212,8 +143,8 @@ static void find_transfer(float *out, const block *b, const alb_shadow_world *wo
 // What a shell of a light gives through the transfer P, in the axis' frame: P M S = (M^T P) S, scaled once for three
 // colours. The mean radiance and the flux along the axis go as k^-2 as they are, of M S the rest is taken: its own flux
 // is up to 10 % off between shells.
-static void add_shell(float (*sum)[3], const float *transfer, const view *v, const alb_shadow_field *light, int shell,
-                      const alb_sh_batch *law, size_t count)
+static void add_shell(float (*sum)[3], const float *transfer, const alb_shadow_receivers *v,
+                      const alb_shadow_field *light, int shell, const alb_sh_batch *law, size_t count)
 {
     float rest[VALUES * BLOCK], weights[VALUES * BLOCK], sample[3 * VALUES];
     memcpy(rest, transfer, sizeof rest);
@@ -237,13 +168,12 @@ static void add_light(float (*irradiance)[3], const block *b, const alb_shadow_w
                       const alb_shadow_field *light)
 {
     float transfer[VALUES * BLOCK], sum[BLOCK][3] = {{0}};
-    double distances_mm[BLOCK];
-    view v;
-    look_at(&v, distances_mm, b, light);
-    find_transfer(transfer, b, world, &light->sphere, distances_mm);
+    alb_shadow_receivers v;
+    alb_shadow_receivers_at(&v, light, b->points, b->count);
+    find_transfer(transfer, b, world, &light->sphere, v.distances_mm);
     alb_sh_to_axis_batch(transfer, transfer, ORDER, v.axes, BLOCK, b->count);
     for (int shell = 0; shell < light->shells; shell++)
-        if (weigh(&v, distances_mm, light, shell, b->count))
+        if (alb_shadow_receivers_weigh(&v, light, shell))
             add_shell(sum, transfer, &v, light, shell, &world->laws->light, b->count);
     for (size_t r = 0; r < b->count; r++)
         for (int c = 0; c < 3; c++)

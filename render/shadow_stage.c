@@ -80,7 +80,6 @@ static void free_fields(alb_shadow_stage *stage)
     free(stage->groups);
     free(stage->normals);
     free(stage->irradiance);
-    alb_shadow_laws_free(&stage->laws);
     const alb_shadow_stage kept = *stage;
     *stage = (alb_shadow_stage){
         .settings = kept.settings, .paper = kept.paper, .skies = kept.skies, .sky_count = kept.sky_count};
@@ -89,8 +88,15 @@ static void free_fields(alb_shadow_stage *stage)
 void alb_shadow_stage_free(alb_shadow_stage *stage)
 {
     free_fields(stage);
+    alb_shadow_laws_free(&stage->laws);
     free(stage->skies);
     *stage = (alb_shadow_stage){0};
+}
+
+void alb_shadow_stage_set(alb_shadow_stage *stage, const alb_shadow_settings *settings)
+{
+    free_fields(stage);
+    stage->settings = *settings;
 }
 
 static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
@@ -117,7 +123,14 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
     memcpy(stage->groups, mesh->groups, mesh->face_count * sizeof *stage->groups);
     stage->face_count = mesh->face_count;
     stage->vertex_count = mesh->vertex_count;
-    return alb_shadow_laws_create(&stage->laws, stage->settings.order, stage->paper, error);
+    if (stage->laws_order == stage->settings.order)
+        return true;
+    alb_shadow_laws_free(&stage->laws);
+    stage->laws_order = 0;
+    if (!alb_shadow_laws_create(&stage->laws, stage->settings.order, stage->paper, error))
+        return false;
+    stage->laws_order = stage->settings.order;
+    return true;
 }
 
 static bool still_fits(const alb_shadow_stage *stage, const alb_mesh *mesh)

@@ -16,6 +16,7 @@ typedef struct alb_shadow_stage {
     alb_shadow_sky *skies;
     size_t sky_count;
     alb_shadow_laws laws;
+    int laws_order;             // for which they were made; 0: none
     alb_vector *normals;        // of the vertices: means over their faces by area
     float (*irradiance)[3];     // of the vertices
     double sampling_s, light_s; // of the latest frame
@@ -28,5 +29,7 @@ typedef struct alb_shadow_stage {
 // its parts fail; the stage then makes new fields at the next try.
 bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error);
 void alb_shadow_stage_free(alb_shadow_stage *stage);
+// Other settings from the next frame on.
+void alb_shadow_stage_set(alb_shadow_stage *stage, const alb_shadow_settings *settings);
 // What alb_shadow_irradiance was given; borrows from the stage.
 alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage);
