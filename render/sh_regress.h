@@ -4,8 +4,8 @@
 //     M(k) = k^-2 (I + u R(u)),  u = 1 - 1/k,  R a polynomial with one coefficient matrix per power
 //
 // from `bench.sh_regress`, which fits it and writes render/sh_regress_data.c. From 1.02 times the bounding sphere.
-// Where it stops being true: samples inside the bounding sphere; objects that are nothing like clusters of spheres get
-// an error like theirs only if their shadows are.
+// Where it stops being true: samples inside the bounding sphere; solid objects that fill it, whose shadow it takes for
+// that of a nearer, smaller one (a ball of 0.98 from k = 2 on is 3 to 4 times as far off as by the windowed law).
 #pragma once
 #include "render/sh_scale.h"
 

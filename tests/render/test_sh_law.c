@@ -128,6 +128,28 @@ static void seldom_worse_than_nothing(void **state)
     check_below((double)worse[1] / tried, 0.05);
 }
 
+// Where the regressed law ends: a ball of 0.98 of its sphere, sampled at 1.1; figures of docs/sh.md, two digits.
+static void solid_balls(void **state)
+{
+    (void)state;
+    const double k[] = {1.3, 2, 4}, wanted[2][3] = {{0.057, 0.017, 0.0053}, {0.051, 0.053, 0.021}};
+    for (int i = 0; i < 3; i++)
+        for (int n = 0; n < 2; n++) {
+            const sphere_cluster solid = {.count = 1, .radius = {0.98}}, airy = {.count = 1, .radius = {0.6}};
+            double sample[COUNT], truth[COUNT], found[2][COUNT];
+            const alb_sh_scaling m[2] = {law_at(&windowed, k[i]), law_at(&regressed, k[i])};
+            sphere_cluster_occlusion(sample, 4, &solid, 1.1);
+            sphere_cluster_occlusion(truth, 4, &solid, 1.1 * k[i]);
+            alb_sh_scaling_apply(found[n], &m[n], sample);
+            check_relative(rms(found[n], truth), wanted[n][i], 0.03);
+            sphere_cluster_occlusion(sample, 4, &airy, 1.1);
+            sphere_cluster_occlusion(truth, 4, &airy, 1.1 * k[i]);
+            for (int law = 0; law < 2; law++)
+                alb_sh_scaling_apply(found[law], &m[law], sample);
+            check_below(rms(found[1], truth), rms(found[0], truth));
+        }
+}
+
 // V of 25 equal factors multiplied in turn: the most and the least over directions.
 static void chain(double *lowest, double *highest, double occlusion[COUNT])
 {
@@ -300,6 +322,7 @@ int main(void)
         cmocka_unit_test(far_field_residue),
         cmocka_unit_test(clusters),
         cmocka_unit_test(seldom_worse_than_nothing),
+        cmocka_unit_test(solid_balls),
         cmocka_unit_test(product_blow_up),
         cmocka_unit_test(laws_around_one),
         cmocka_unit_test(energy_as_fall_off),
