@@ -164,9 +164,12 @@ static void add_shell(float (*sum)[3], const float *transfer, const alb_shadow_r
     memset(rest, 0, BLOCK * sizeof *rest);
     memset(rest + 2 * BLOCK, 0, BLOCK * sizeof *rest);
     alb_sh_batch_apply(weights, law, true, v->k, rest, BLOCK, count);
+    const float least =
+        shell ? 0.1F : 1; // inside the first shell light grows no more, and a shell without weight is finite
     for (size_t r = 0; r < count; r++) {
-        weights[r] += transfer[r] / (v->k[r] * v->k[r]);
-        weights[2 * BLOCK + r] += transfer[2 * BLOCK + r] / (v->k[r] * v->k[r]);
+        const float square = v->k[r] * v->k[r], share = 1 / (square > least ? square : least);
+        weights[r] += share * transfer[r];
+        weights[2 * BLOCK + r] += share * transfer[2 * BLOCK + r];
     }
     alb_sh_from_axis_batch(weights, weights, ORDER, v->axes, BLOCK, count);
     for (size_t r = 0; r < count; r++) {

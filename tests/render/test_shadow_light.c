@@ -93,7 +93,7 @@ static void light_falls_off(void **state)
     stage *s = new_stage(4);
     alb_random random = alb_random_at(1, 5, 0);
     const alb_vector centre = {7, -3, 2};
-    double worst = 0;
+    double worst = 0, before = 0;
     add_ball(s, 1, centre, 2, alb_shadow_light_settings);
     for (double x = 1.1; x < 16; x *= 1.07) {
         const alb_vector d = direction(&random);
@@ -101,6 +101,13 @@ static void light_falls_off(void **state)
         worst = fmax(worst, fabs(found * x * x / M_PI - 1));
     }
     print_message("an even ball from 1.1 to 16 radii: within %.2f %% of the closed form\n", 100 * worst);
+    for (double x = 0; x < 1.1; x += 0.01) { // inside its sphere: finite, no more than a sky of it gives
+        const double found = irradiance(s, alb_add(centre, (alb_vector){0, 2 * x, 0}), (alb_vector){0, -1, 0});
+        assert_true(found >= 0 && found <= 1.3 * M_PI);
+        before = x > 0.015 ? before : found;          // the middle has an axis of its own
+        check_below(fabs(found - before), 0.01 * 10); // and without a step
+        before = found;
+    }
     // straight beside it the clamped cosine of order 4 is 3/32, not 0: a ball that is small takes that share
     for (double x = 3; x < 16; x *= 1.2) {
         const double found = irradiance(s, alb_add(centre, (alb_vector){2 * x, 0, 0}), (alb_vector){0, 0.6, 0.8});
