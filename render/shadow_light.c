@@ -164,8 +164,8 @@ static void add_shell(float (*sum)[3], const float *transfer, const alb_shadow_r
     memset(rest, 0, BLOCK * sizeof *rest);
     memset(rest + 2 * BLOCK, 0, BLOCK * sizeof *rest);
     alb_sh_batch_apply(weights, law, true, v->k, rest, BLOCK, count);
-    const float least =
-        shell ? 0.1F : 1; // inside the first shell light grows no more, and a shell without weight is finite
+    // well inside the first shell light grows no more; nearer to the middle a shell has no weight, and must be finite
+    const float least = shell ? 0.1F : 0.5F;
     for (size_t r = 0; r < count; r++) {
         const float square = v->k[r] * v->k[r], share = 1 / (square > least ? square : least);
         weights[r] += share * transfer[r];

@@ -101,11 +101,11 @@ static void light_falls_off(void **state)
         worst = fmax(worst, fabs(found * x * x / M_PI - 1));
     }
     print_message("an even ball from 1.1 to 16 radii: within %.2f %% of the closed form\n", 100 * worst);
-    for (double x = 0; x < 1.1; x += 0.01) { // inside its sphere: finite, no more than a sky of it gives
+    for (double x = 0; x < 1.1; x += 0.01) { // inside its sphere: finite, twice that at 1.1 radii
         const double found = irradiance(s, alb_add(centre, (alb_vector){0, 2 * x, 0}), (alb_vector){0, -1, 0});
-        assert_true(found >= 0 && found <= 1.3 * M_PI);
+        assert_true(found >= 0 && found <= 1.7 * M_PI);
         before = x > 0.015 ? before : found;          // the middle has an axis of its own
-        check_below(fabs(found - before), 0.01 * 10); // and without a step
+        check_below(fabs(found - before), 0.01 * 15); // and without a step: it rises as k^-2, 14 a radius
         before = found;
     }
     // straight beside it the clamped cosine of order 4 is 3/32, not 0: a ball that is small takes that share
