@@ -57,22 +57,30 @@ static int entry_of(const alb_crossing *crossings, size_t count, uint32_t triang
     return -1;
 }
 
-// Follows the curve (its number for the order) from where the chord leaves, upwards, until it is back at the chord. The
-// crossing by which it returns, or -1. A corner in the plane counts as above it.
-static int follow(cut *cuts, int *cut_count, int curve, const alb_surface_net *net, const plane *p,
-                  const alb_crossing *crossings, size_t crossing_count, uint32_t triangle)
+// Where the section leaves the triangle, forwards (upwards: up); of no place where it does not cross it. A corner in
+// the plane counts as above it.
+static cut leave(const plane *p, const alb_surface_net *net, uint32_t triangle, bool upwards)
 {
     const alb_vector *t = net->triangles[triangle];
     const double heights[3] = {height(p, t[0]), height(p, t[1]), height(p, t[2])};
-    cut best = {.place = UINT32_MAX};
+    cut furthest = {.place = UINT32_MAX};
     for (int k = 0; k < 3; k++) {
         const double ha = heights[k], hb = heights[(k + 1) % 3];
         if ((ha >= 0) == (hb >= 0))
             continue;
         const cut found = cut_at(p, t[k], t[(k + 1) % 3], ha, hb, 3 * triangle + (uint32_t)k);
-        if (best.place == UINT32_MAX || found.y > best.y)
-            best = found;
+        if (furthest.place == UINT32_MAX || (upwards ? found.y > furthest.y : found.x > furthest.x))
+            furthest = found;
     }
+    return furthest;
+}
+
+// Follows the curve (its number for the order) from where the chord leaves, upwards, until it is back at the chord. The
+// crossing by which it returns, or -1.
+static int follow(cut *cuts, int *cut_count, int curve, const alb_surface_net *net, const plane *p,
+                  const alb_crossing *crossings, size_t crossing_count, uint32_t triangle)
+{
+    cut best = leave(p, net, triangle, true);
     if (best.place == UINT32_MAX)
         return -1;
     while (*cut_count < POINTS) {
@@ -136,23 +144,6 @@ static int tighten(cut *cuts, int count, double length)
 
 static double norm(double x, double y) { return sqrt(x * x + y * y); }
 
-// Where the section leaves the triangle forwards; of no place where it does not cross it.
-static cut leave(const plane *p, const alb_surface_net *net, uint32_t triangle)
-{
-    const alb_vector *t = net->triangles[triangle];
-    const double heights[3] = {height(p, t[0]), height(p, t[1]), height(p, t[2])};
-    cut furthest = {.place = UINT32_MAX};
-    for (int k = 0; k < 3; k++) {
-        const double ha = heights[k], hb = heights[(k + 1) % 3];
-        if ((ha >= 0) == (hb >= 0))
-            continue;
-        const cut found = cut_at(p, t[k], t[(k + 1) % 3], ha, hb, 3 * triangle + (uint32_t)k);
-        if (furthest.place == UINT32_MAX || found.x > furthest.x)
-            furthest = found;
-    }
-    return furthest;
-}
-
 static double taut_length(const cut *hull, int kept, double length)
 {
     double x = 0, y = 0, sum = 0;
@@ -171,7 +162,7 @@ bool alb_slice_along(double *length_mm, const alb_surface_net *net, uint32_t fro
     plane p = {.origin = start, .along = alb_unit(chord)};
     p.up = alb_unit(alb_sub(inwards, alb_times(alb_dot(inwards, p.along), p.along)));
     p.normal = alb_cross(p.along, p.up);
-    cut cuts[STEPS], at = leave(&p, net, from);
+    cut cuts[STEPS], at = leave(&p, net, from, false);
     double x = 0, y = 0, length = 0;
     for (int count = 0; count < STEPS && at.place != UINT32_MAX; count++) {
         length += norm(at.x - x, at.y - y);
