@@ -71,12 +71,23 @@ static void scale_and_place_do_not_matter(void **state)
     world_free(&first);
 }
 
+// What the 256 rays of seed 1 state as their error, of the worst channel.
+static double stated_percent(const world *w, const double (*light)[3])
+{
+    alb_form_factors f;
+    alb_error error = {0};
+    double stated;
+    cast(&f, w, 256, 1);
+    check_ok(alb_form_factors_error(&stated, &f, light, NULL, &error), &error);
+    alb_form_factors_free(&f);
+    return stated;
+}
+
 // Turned, a patch has other tangents and so other rays: the same answer within what both state as errors.
 static void turning_does_not_matter(void **state)
 {
     (void)state;
     world first, second;
-    alb_error error = {0};
     world_of_box(&first, &hall);
     world_of_box(&second, &hall);
     const size_t n = first.patches.count;
@@ -92,16 +103,12 @@ static void turning_does_not_matter(void **state)
     field_of(light, &first, 1, (alb_vector){0});
     gather(a, &first, (const double(*)[3])light, 256);
     gather(b, &second, (const double(*)[3])light, 256);
-    alb_form_factors f;
-    double stated;
-    cast(&f, &first, 256, 1);
-    check_ok(alb_form_factors_error(&stated, &f, (const double(*)[3])light, NULL, &error), &error); // worst channel
+    const double stated = stated_percent(&first, (const double(*)[3])light);
     for (int c = 0; c < 3; c++) {
         const double apart = rms_percent((const double(*)[3])b, (const double(*)[3])a, n, 1, c);
         check_below(apart, sqrt(2) * stated);
         assert_true(apart > 0); // they are other rays
     }
-    alb_form_factors_free(&f);
     free(a);
     free(b);
     free(light);
@@ -169,7 +176,6 @@ static void order_of_faces_does_not_matter(void **state)
 {
     (void)state;
     world first, second;
-    alb_error error = {0};
     world_of_box(&first, &hall);
     world_of_box(&second, &hall);
     const size_t n = first.patches.count;
@@ -184,14 +190,10 @@ static void order_of_faces_does_not_matter(void **state)
         memcpy(back[p * 401 % n], b[p], sizeof b[p]);
         light[p][0] = first.patches.centroids[p].x > 0.3;
     }
-    alb_form_factors f;
-    double stated;
-    cast(&f, &first, 256, 1);
-    check_ok(alb_form_factors_error(&stated, &f, (const double(*)[3])light, NULL, &error), &error);
+    const double stated = stated_percent(&first, (const double(*)[3])light);
     const double apart = rms_percent((const double(*)[3])back, (const double(*)[3])a, n, 1, 2);
     check_below(apart, sqrt(2) * stated); // of the sharp field
     assert_true(apart > 0);               // they are other rays
-    alb_form_factors_free(&f);
     free(a);
     free(b);
     free(back);
