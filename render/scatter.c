@@ -21,6 +21,7 @@
 #include "render/scatter_links.h"
 #include "render/scatter_product.h"
 #include "render/scatter_rule.h"
+#include "render/scatter_sample.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -342,6 +343,15 @@ void alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, cons
     memset(out, 0, scatter->patch_count * sizeof *out);
     alb_forest_gather(&p->forest, irradiance);
     alb_product_add(out, &p->links, &p->forest, p->kernels, 1U << ALB_TRANSMISSION);
+}
+
+bool alb_scatter_sample(uint32_t *sources, const alb_scatter *scatter, const uint32_t *first, int channel,
+                        alb_error *error)
+{
+    const alb_scatter_parts *p = scatter->parts;
+    return alb_links_sample(sources, first, channel, &p->links, &p->forest, p->kernels,
+                            (const double(*)[3])scatter->row_sums, (const double(*)[3])scatter->local,
+                            scatter->patch_count, error);
 }
 
 void alb_scatter_note(FILE *out, const char *prefix, const alb_scatter *scatter)
