@@ -20,6 +20,7 @@
 #include "base/progress.h"
 #include "render/sh_product.h"
 #include "render/sh_rotate.h"
+#include "render/sh_zonal.h"
 #include "render/shadow_receivers.h"
 #include <omp.h>
 #include <stdlib.h>
@@ -32,7 +33,7 @@ static const double constant_one = 3.5449077018110318; // sqrt(4 pi)
 typedef struct block {
     size_t count;
     alb_vector points[BLOCK], normals[BLOCK];
-    float cosine[VALUES * BLOCK];                         // max(0, n.d)
+    float lobe[ALB_SH_COUNT_MAX * BLOCK];                 // max(0, n.d)
     double distances_mm[ALB_SHADOW_OCCLUDERS_MAX][BLOCK]; // to the occluders' centres
     float shares[ALB_SHADOW_OCCLUDERS_MAX][BLOCK];        // of the occlusion that is above the horizon
     bool hides[ALB_SHADOW_OCCLUDERS_MAX];                 // any of the shares is not 0
@@ -40,20 +41,21 @@ typedef struct block {
     alb_shadow_seconds seconds;
 } block;
 
-static void set_cosine(block *b)
+static void set_lobes(block *b)
 {
-    static const double lobe[ORDER] = {M_PI, 2 * M_PI / 3, M_PI / 4, 0}; // zonal: A_l of Ramamoorthi & Hanrahan 2001
+    double zonal[ALB_SH_ORDER_MAX];
     float normals[3 * BLOCK];
+    alb_sh_zonal_cosine(zonal, ALB_SH_ORDER_MAX);
     for (size_t r = 0; r < b->count; r++) {
         normals[r] = (float)b->normals[r].x;
         normals[BLOCK + r] = (float)b->normals[r].y;
         normals[2 * BLOCK + r] = (float)b->normals[r].z;
     }
-    alb_sh_evaluate_batch(b->cosine, ORDER, normals, BLOCK, b->count);
-    for (int l = 0; l < ORDER; l++)
+    alb_sh_evaluate_batch(b->lobe, ALB_SH_ORDER_MAX, normals, BLOCK, b->count);
+    for (int l = 0; l < ALB_SH_ORDER_MAX; l++)
         for (int i = l * l; i < (l + 1) * (l + 1); i++)
             for (size_t r = 0; r < b->count; r++)
-                b->cosine[(size_t)i * BLOCK + r] *= (float)lobe[l];
+                b->lobe[(size_t)i * BLOCK + r] *= (float)(sqrt(4 * M_PI / (2 * l + 1)) * zonal[l]);
 }
 
 // Where receivers look the field up: from within its sphere a tenth of the radius above their surface, for the nodes
@@ -122,7 +124,7 @@ static double share_before(const alb_shadow_sphere *occluder, const alb_shadow_s
 // horizon.
 static void set_lobe(float *out, const block *b, const alb_shadow_sphere *light)
 {
-    memcpy(out, b->cosine, sizeof b->cosine);
+    memcpy(out, b->lobe, VALUES * BLOCK * sizeof *out);
     for (size_t r = 0; light && r < b->count; r++) {
         const double height = alb_dot(alb_sub(light->centre_mm, b->points[r]), b->normals[r]) / light->radius_mm;
         const float above = (float)fmin(fmax(2 * height - 1, 0), 1);
@@ -196,39 +198,17 @@ static void add_light(float (*irradiance)[3], const block *b, const alb_shadow_w
             irradiance[r][c] += sum[r][c] > 0 ? sum[r][c] : 0;
 }
 
-// The transfer as weights of what is seen from the sky's centre.
-static void move_to_centre(float *out, float *transfer, const block *b, const alb_shadow_sky *sky,
-                           const alb_sh_batch *law)
-{
-    float axes[3 * BLOCK], k[BLOCK];
-    for (size_t r = 0; r < b->count; r++) {
-        const alb_vector off = alb_sub(b->points[r], sky->centre_mm);
-        const double distance = alb_length(off);
-        const alb_vector d = distance > 0 ? alb_times(1 / distance, off) : (alb_vector){0, 0, 1};
-        axes[r] = (float)d.x, axes[BLOCK + r] = (float)d.y, axes[2 * BLOCK + r] = (float)d.z;
-        k[r] = (float)(distance / sky->radius_mm);
-    }
-    alb_sh_to_axis_batch(transfer, transfer, ORDER, axes, BLOCK, b->count);
-    alb_sh_batch_apply(out, law, true, k, transfer, BLOCK, b->count);
-    alb_sh_from_axis_batch(out, out, ALB_SH_ORDER_MAX, axes, BLOCK, b->count);
-}
-
+// The bands of the lobe beyond order 4 fade with what the occluders leave of its mean.
 static void add_sky(float (*irradiance)[3], const block *b, const alb_shadow_world *world, const alb_shadow_sky *sky)
 {
-    float transfer[VALUES * BLOCK], weights[ALB_SH_COUNT_MAX * BLOCK];
+    float transfer[ALB_SH_COUNT_MAX * BLOCK];
     find_transfer(transfer, b, world, NULL, NULL);
-    const bool finite = sky->radius_mm > 0;
-    if (finite)
-        move_to_centre(weights, transfer, b, sky, &world->laws->sky);
-    const float *from = finite ? weights : transfer;
-    for (int c = 0; c < 3; c++) {
-        float sum[BLOCK] = {0};
-        for (int i = 0; i < sky->order * sky->order; i++)
-            for (size_t r = 0; r < b->count; r++)
-                sum[r] += from[(size_t)i * BLOCK + r] * sky->radiance[c][i];
-        for (size_t r = 0; r < b->count; r++)
-            irradiance[r][c] += sum[r] > 0 ? sum[r] : 0;
+    for (size_t r = 0; r < b->count; r++) {
+        const float left = fminf(fmaxf(transfer[r] / b->lobe[r], 0), 1);
+        for (size_t i = VALUES; i < ALB_SH_COUNT_MAX; i++)
+            transfer[i * BLOCK + r] = left * b->lobe[i * BLOCK + r];
     }
+    alb_shadow_sky_add(irradiance, sky, &world->laws->sky, transfer, b->points, b->count);
 }
 
 static bool check(const alb_shadow_world *world, const alb_vector *points, size_t count, alb_error *error)
@@ -254,7 +234,7 @@ static void light_block(float (*irradiance)[3], block *b, const alb_shadow_world
 {
     memset(irradiance, 0, b->count * sizeof *irradiance);
     const double start_s = alb_clock_s();
-    set_cosine(b);
+    set_lobes(b);
     find_occlusions(b, world);
     const double found_s = alb_clock_s();
     for (size_t j = 0; j < world->light_count; j++)
