@@ -9,7 +9,7 @@ bool alb_shadow_laws_create(alb_shadow_laws *laws, int order, bool paper, alb_er
         {far, ALB_SH_MAP_CONE, 45, ALB_SHADOW_ORDER, order},
         {ALB_SH_LAW_VISIBILITY, ALB_SH_MAP_CONE, 45, ALB_SHADOW_ORDER, order},
         {ALB_SH_LAW_LIGHT, ALB_SH_MAP_CONE, 45, ALB_SHADOW_ORDER, ALB_SHADOW_ORDER},
-        {ALB_SH_LAW_VISIBILITY, ALB_SH_MAP_MIDRANGE, 45, ALB_SHADOW_ORDER, ALB_SH_ORDER_MAX},
+        {ALB_SH_LAW_VISIBILITY, ALB_SH_MAP_MIDRANGE, 45, ALB_SH_ORDER_MAX, ALB_SH_ORDER_MAX},
     };
     *laws = (alb_shadow_laws){0};
     alb_sh_batch *const batches[LAWS] = {&laws->outer, &laws->inner, &laws->light, &laws->sky};
