@@ -19,6 +19,7 @@ typedef struct sequence {
     alb_shadow_stage stage;
     double exposure, wanted_percent; // 0: none yet, none stated
     double error_percent, upper_percent, small_share;
+    double transport_s;                 // once
     double sampling_s, light_s, view_s; // of all frames
     int frames;
 } sequence;
@@ -101,6 +102,7 @@ static bool render_frame(sequence *s, int frame, alb_error *error)
     const double start_s = alb_clock_s();
     ok = ok && write_frame(s, &scene, &provenance, frame, error);
     s->view_s += alb_clock_s() - start_s;
+    s->transport_s = s->stage.transport_s;
     s->sampling_s += s->stage.sampling_s;
     s->light_s += s->stage.light_s;
     s->frames = scene.frames;
@@ -125,6 +127,7 @@ static bool report(const sequence *s, bool as_json, alb_error *error)
     alb_json_integer(&json, "vertices", (long)s->stage.vertex_count);
     alb_json_integer(&json, "occluders", (long)s->stage.occluder_count);
     alb_json_integer(&json, "lights", (long)s->stage.light_count);
+    alb_json_integer(&json, "transport_vertices", (long)s->stage.transport.row_count);
     alb_json_integer(&json, "order", settings->order);
     alb_json_integer(&json, "cells", settings->cells);
     alb_json_integer(&json, "shells_outside", settings->outer);
@@ -133,6 +136,7 @@ static bool report(const sequence *s, bool as_json, alb_error *error)
     alb_json_number(&json, "upper_error_percent", s->upper_percent);
     alb_json_number(&json, "small_light_share", s->small_share);
     alb_json_object(&json, "seconds");
+    alb_json_number(&json, "transport", s->transport_s);
     alb_json_number(&json, "sampling", s->sampling_s);
     alb_json_number(&json, "lighting", s->light_s);
     alb_json_number(&json, "view", s->view_s);

@@ -31,9 +31,11 @@ static const double constant_one = 3.5449077018110318; // sqrt(4 pi)
 
 // A block of receivers, structures of arrays.
 typedef struct block {
-    size_t count;
+    size_t first, count;
     alb_vector points[BLOCK], normals[BLOCK];
-    float lobe[ALB_SH_COUNT_MAX * BLOCK];                 // max(0, n.d)
+    float cosine[VALUES * BLOCK];                         // max(0, n.d)
+    float lobe[ALB_SH_COUNT_MAX * BLOCK];                 // the same, or precomputed transport: what skies light
+    bool in_body[BLOCK];                                  // receivers with transport
     double distances_mm[ALB_SHADOW_OCCLUDERS_MAX][BLOCK]; // to the occluders' centres
     float shares[ALB_SHADOW_OCCLUDERS_MAX][BLOCK];        // of the occlusion that is above the horizon
     bool hides[ALB_SHADOW_OCCLUDERS_MAX];                 // any of the shares is not 0
@@ -41,7 +43,7 @@ typedef struct block {
     alb_shadow_seconds seconds;
 } block;
 
-static void set_lobes(block *b)
+static void set_lobes(block *b, const alb_shadow_world *world)
 {
     double zonal[ALB_SH_ORDER_MAX];
     float normals[3 * BLOCK];
@@ -56,6 +58,10 @@ static void set_lobes(block *b)
         for (int i = l * l; i < (l + 1) * (l + 1); i++)
             for (size_t r = 0; r < b->count; r++)
                 b->lobe[(size_t)i * BLOCK + r] *= (float)(sqrt(4 * M_PI / (2 * l + 1)) * zonal[l]);
+    memcpy(b->cosine, b->lobe, sizeof b->cosine);
+    memset(b->in_body, 0, sizeof b->in_body);
+    if (world->transport)
+        alb_shadow_transport_lobes(b->lobe, b->in_body, world->transport, b->first, b->count);
 }
 
 // Where receivers look the field up: from within its sphere a tenth of the radius above their surface, for the nodes
@@ -67,6 +73,12 @@ static void look_up_above(alb_vector *points, const block *b, const alb_shadow_s
         const double rise_mm = 0.1 * sphere->radius_mm * fmin(fmax(4 * (1 - x), 0), 1);
         points[r] = alb_add(b->points[r], alb_times(rise_mm, b->normals[r]));
     }
+}
+
+// Transport knows what the body hides of the skies from itself.
+static bool counts(const block *b, const alb_shadow_world *world, size_t occluder, size_t receiver, bool sky)
+{
+    return !(sky && b->in_body[receiver] && world->of_body[occluder]);
 }
 
 static void find_occlusions(block *b, const alb_shadow_world *world)
@@ -82,7 +94,7 @@ static void find_occlusions(block *b, const alb_shadow_world *world)
         memcpy(b->distances_mm[o], v.distances_mm, sizeof v.distances_mm);
         for (size_t r = 0; r < b->count; r++) { // the height of the sphere's top above the horizon, in radii
             const double top = 1 - alb_dot(v.directions[r], b->normals[r]) * b->distances_mm[o][r] / radius;
-            b->shares[o][r] = (float)fmin(fmax(1 + 10 * top, 0), 1);
+            b->shares[o][r] = counts(b, world, o, r, !world->light_count) ? (float)fmin(fmax(1 + 10 * top, 0), 1) : 0;
             b->hides[o] |= b->shares[o][r] > 0;
         }
         if (!b->hides[o])
@@ -124,7 +136,7 @@ static double share_before(const alb_shadow_sphere *occluder, const alb_shadow_s
 // horizon.
 static void set_lobe(float *out, const block *b, const alb_shadow_sphere *light)
 {
-    memcpy(out, b->lobe, VALUES * BLOCK * sizeof *out);
+    memcpy(out, light ? b->cosine : b->lobe, sizeof b->cosine);
     for (size_t r = 0; light && r < b->count; r++) {
         const double height = alb_dot(alb_sub(light->centre_mm, b->points[r]), b->normals[r]) / light->radius_mm;
         const float above = (float)fmin(fmax(2 * height - 1, 0), 1);
@@ -144,7 +156,7 @@ static void find_transfer(float *out, const block *b, const alb_shadow_world *wo
     for (size_t s = 0; s < stages; s++) {
         for (size_t r = 0; r < b->count; r++) {
             const size_t o = order[s][r];
-            float share = b->shares[o][r];
+            float share = counts(b, world, o, r, !light) ? b->shares[o][r] : 0;
             if (light)
                 share *= (float)share_before(&world->occluders[o].sphere, light, b->distances_mm[o][r], light_mm[r]);
             for (size_t i = 0; i < VALUES; i++)
@@ -234,7 +246,7 @@ static void light_block(float (*irradiance)[3], block *b, const alb_shadow_world
 {
     memset(irradiance, 0, b->count * sizeof *irradiance);
     const double start_s = alb_clock_s();
-    set_lobes(b);
+    set_lobes(b, world);
     find_occlusions(b, world);
     const double found_s = alb_clock_s();
     for (size_t j = 0; j < world->light_count; j++)
@@ -260,6 +272,7 @@ bool alb_shadow_irradiance(float (*irradiance)[3], const alb_shadow_world *world
         const size_t thread = (size_t)omp_get_thread_num(), first = k * BLOCK;
         block *b = &blocks[thread];
         b->occlusion = occlusion + thread * per_thread;
+        b->first = first;
         b->count = count - first < BLOCK ? count - first : BLOCK;
         memcpy(b->points, points + first, b->count * sizeof *points);
         memcpy(b->normals, normals + first, b->count * sizeof *normals);

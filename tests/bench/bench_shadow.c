@@ -17,7 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SAMPLES = 2000, WAYS = 6, RAYS = 4, CHECKED = 3 };
+enum { SAMPLES = 2000, WAYS = 7, RAYS = 4, CHECKED = 3 };
 
 static const struct {
     const char *name;
@@ -26,7 +26,9 @@ static const struct {
     double cluster;
 } ways[WAYS] = {{"as printed", true, 4, 1, 0, 8, 32, 0},   {"windowed", false, 4, 1, 0, 8, 64, 0.04},
                 {"2 shells", false, 4, 2, 0, 8, 64, 0.04}, {"order 8 to 4", false, 8, 1, 0, 8, 64, 0.04},
-                {"4 shells", false, 4, 2, 2, 8, 64, 0.04}, {"4 shells, order 8", false, 8, 2, 2, 12, 64, 0.02}};
+                {"4 shells", false, 4, 2, 2, 8, 64, 0.04}, {"4 shells, order 8", false, 8, 2, 2, 12, 64, 0.02},
+                {"transport", false, 4, 1, 0, 8, 64, 0.04}};
+enum { TRANSPORT = WAYS - 1 };
 static const int strata[RAYS] = {4, 8, 16, 32};
 
 typedef struct result {
@@ -51,6 +53,16 @@ static alb_shadow_stage stage_of(int way)
     stage.settings.pixels = ways[way].pixels;
     stage.settings.cluster = ways[way].cluster;
     return stage;
+}
+
+// Rigid objects get precomputed transport in the way of that name alone.
+static bool create_scene(alb_scene *scene, int index, int frame, int way, alb_error *error)
+{
+    if (!shadow_scenes[index].create(scene, frame, error))
+        return false;
+    for (size_t o = 0; o < scene->object_count; o++)
+        scene->objects[o].rigid &= way == TRANSPORT;
+    return true;
 }
 
 static bool in_light(const alb_shadow_stage *stage, const alb_scene *scene, size_t vertex)
@@ -129,7 +141,7 @@ static bool run_way(result *out, int scene_index, int way, int frames, alb_error
     for (int n = -1; ok && n < frames; n++) {
         alb_scene scene;
         const int frame = (n + 1) * which->frames / (frames + 1);
-        if (!which->create(&scene, frame, error)) {
+        if (!create_scene(&scene, scene_index, frame, way, error)) {
             ok = false;
             break;
         }
@@ -175,8 +187,8 @@ static bool run_rays(double *ms, double *percent, int scene_index, alb_error *er
     alb_shadow_stage stage = stage_of(1);
     static truth t;
     static float found[SAMPLES][3];
-    bool ok = which->create(&scene, which->frames / 6, error) && alb_shadow_stage_light(&stage, &scene, error) &&
-              find_truth(&t, &stage, &scene, error);
+    bool ok = create_scene(&scene, scene_index, which->frames / 6, 1, error) &&
+              alb_shadow_stage_light(&stage, &scene, error) && find_truth(&t, &stage, &scene, error);
     for (int k = 0; ok && k < RAYS; k++) {
         const double start_s = alb_clock_s();
         alb_shadow_cast(found, &t.tracer, (const float(*)[3])t.radiance, scene.lights, scene.light_count, t.points,
