@@ -177,22 +177,22 @@ static void says_what_error_it_makes(void **state)
     (void)state;
     alb_error error = {0};
     alb_scene scene;
-    double percent, upper;
+    alb_shadow_verdict made;
     check_ok(shadow_scenes[2].create(&scene, 20, &error), &error);
     alb_shadow_stage stage = {.settings = alb_shadow_defaults};
     check_ok(alb_shadow_stage_light(&stage, &scene, &error), &error);
-    check_ok(alb_shadow_error(&percent, &upper, &stage, &scene, 1, &error), &error);
-    assert_true(percent > 0.5 && percent < upper && upper < 20);
+    check_ok(alb_shadow_error(&made, &stage, &scene, 1, &error), &error);
+    assert_true(made.percent > 0.5 && made.percent < made.upper_percent && made.upper_percent < 20);
     // what is spoilt by 30 % everywhere must be said to be so
     for (size_t v = 0; v < scene.mesh.vertex_count; v++)
         for (int c = 0; c < 3; c++)
             stage.irradiance[v][c] *= 1.3F;
-    check_ok(alb_shadow_error(&percent, &upper, &stage, &scene, 1, &error), &error);
-    print_message("spoilt by 30 %%: %.1f, within %.1f\n", percent, upper);
-    assert_true(percent > 25 && upper < 60);
-    check_ok(alb_shadow_advise(&stage, &upper, &scene, 8, 1, &error), &error);
-    assert_true(upper <= 8);
-    check_fails(alb_shadow_advise(&stage, &upper, &scene, 0.01, 1, &error), &error, ALB_UNDECIDED, "radiosity");
+    check_ok(alb_shadow_error(&made, &stage, &scene, 1, &error), &error);
+    print_message("spoilt by 30 %%: %.1f, within %.1f\n", made.percent, made.upper_percent);
+    assert_true(made.percent > 25 && made.upper_percent < 60);
+    check_ok(alb_shadow_advise(&stage, &made, &scene, 8, 1, &error), &error);
+    assert_true(made.upper_percent <= 8);
+    check_fails(alb_shadow_advise(&stage, &made, &scene, 0.01, 1, &error), &error, ALB_UNDECIDED, "radiosity");
     alb_shadow_stage_free(&stage);
     alb_scene_free(&scene);
 }
