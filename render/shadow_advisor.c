@@ -147,6 +147,7 @@ bool alb_shadow_advise(alb_shadow_stage *stage, alb_shadow_verdict *verdict, con
         settings.order = ladder[k].order;
         settings.outer = ladder[k].outer;
         settings.inner = ladder[k].inner;
+        settings.far = ladder[k].inner > 0;
         settings.cells = ladder[k].cells;
         alb_shadow_stage_set(stage, &settings);
         if (!alb_shadow_stage_light(stage, scene, error) || !alb_shadow_error(verdict, stage, scene, seed, error))

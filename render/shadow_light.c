@@ -202,7 +202,7 @@ static void add_light(float (*irradiance)[3], const block *b, const alb_shadow_w
     alb_shadow_receivers_at(&v, light, b->points, b->count);
     find_transfer(transfer, b, world, &light->sphere, v.distances_mm);
     alb_sh_to_axis_batch(transfer, transfer, ORDER, v.axes, BLOCK, b->count);
-    for (int shell = 0; shell < light->shells; shell++)
+    for (int shell = 0; shell < light->shell_count; shell++)
         if (alb_shadow_receivers_weigh(&v, light, shell))
             add_shell(sum, transfer, &v, light, shell, &world->laws->light, b->count);
     for (size_t r = 0; r < b->count; r++)

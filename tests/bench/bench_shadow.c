@@ -31,8 +31,8 @@ static const struct {
                 {"regressed", false, true, false, 4, 1, 0, 8, 64, 0.04},
                 {"order 8 to 4", false, false, false, 8, 1, 0, 8, 64, 0.04},
                 {"2 shells", false, false, false, 4, 2, 0, 8, 64, 0.04},
-                {"4 shells", false, false, false, 4, 2, 2, 8, 64, 0.04},
-                {"4 shells, order 8", false, false, false, 8, 2, 2, 12, 64, 0.02},
+                {"4 shells", false, false, false, 4, 1, 2, 8, 64, 0.04},
+                {"4 shells, order 8", false, false, false, 8, 1, 2, 12, 64, 0.02},
                 {"transport", false, false, true, 4, 1, 0, 8, 64, 0.04}};
 #define BOTTOM 0.3 // percent, of the chart
 static const int strata[RAYS] = {4, 8, 16, 32};
@@ -71,6 +71,7 @@ static alb_shadow_stage stage_of(int way)
     stage.settings.order = ways[way].order;
     stage.settings.outer = ways[way].outer;
     stage.settings.inner = ways[way].inner;
+    stage.settings.far = ways[way].inner > 0;
     stage.settings.cells = ways[way].cells;
     stage.settings.pixels = ways[way].pixels;
     stage.settings.cluster = ways[way].cluster;
