@@ -28,9 +28,9 @@
 // of the irradiance by rays is that or every row has ALB_RAYS_REFINED_MAX. Rays beyond memory_mb lie in a temporary
 // file. With frames above 1 every run of # in the name of a file stands for the frame's number, 0 to frames - 1, with
 // zeros in front. For --method shadow objects take "shadow": "casts" (what stands where nothing is written) |
-// "receives", and an environment with radius_mm lies on a sphere of that radius instead of infinitely far away.
-// Paths are relative to the file. Units are the user's as long as they agree: flux 1 makes the picture radiance
-// per incident flux, 1/(mm^2 sr).
+// "receives" and "rigid": true for what moves as one body with all that is rigid, and an environment with radius_mm
+// lies on a sphere of that radius instead of infinitely far away. Paths are relative to the file. Units are the user's
+// as long as they agree: flux 1 makes the picture radiance per incident flux, 1/(mm^2 sr).
 #pragma once
 #include "base/camera.h"
 #include "base/json.h"
@@ -45,6 +45,7 @@ enum { ALB_FRAMES_MAX = 100000 };
 typedef struct alb_object {
     size_t first_vertex, vertex_count;
     bool receives_only; // casts no shadow: ground, walls
+    bool rigid;         // moves with all others that are, as one body
 } alb_object;
 
 typedef struct alb_scene {

@@ -46,7 +46,8 @@ static bool assign_materials(alb_mesh *mesh, alb_scene_reader *in, alb_node obje
 static bool read_mesh(alb_mesh *mesh, double *scale, alb_vector *offset, alb_scene_reader *in, alb_node node)
 {
     char path[ALB_PATH_SIZE];
-    if (!alb_node_allow(node, "mesh mm_per_unit material materials translate_mm subdivide_mm shadow", in->error) ||
+    if (!alb_node_allow(node, "mesh mm_per_unit material materials translate_mm subdivide_mm shadow rigid",
+                        in->error) ||
         (alb_node_has(node, "mm_per_unit") && !alb_node_number(scale, node, "mm_per_unit", 1e-6, 1e6, in->error)) ||
         (alb_node_has(node, "translate_mm") && !alb_scene_vector(offset, node, "translate_mm", in->error)) ||
         !alb_scene_input(path, in, node, "mesh"))
@@ -58,7 +59,8 @@ static bool read_box(alb_mesh *mesh, alb_scene_reader *in, alb_node node)
 {
     double size[3], cells[3];
     alb_box box = {.grading = 1};
-    if (!alb_node_allow(node, "shape size_mm centre_mm cells grading inward material subdivide_mm shadow", in->error) ||
+    if (!alb_node_allow(node, "shape size_mm centre_mm cells grading inward material subdivide_mm shadow rigid",
+                        in->error) ||
         !alb_node_numbers(size, 3, node, "size_mm", 1e-6, ALB_SCENE_LONGEST_MM, in->error) ||
         !alb_scene_vector(&box.centre_mm, node, "centre_mm", in->error) ||
         !alb_node_numbers(cells, 3, node, "cells", 1, 4096, in->error) ||
@@ -78,7 +80,7 @@ static bool read_sphere(alb_mesh *mesh, alb_scene_reader *in, alb_node node)
 {
     alb_sphere sphere = {0};
     long subdivisions;
-    if (!alb_node_allow(node, "shape radius_mm centre_mm subdivisions inward material shadow", in->error) ||
+    if (!alb_node_allow(node, "shape radius_mm centre_mm subdivisions inward material shadow rigid", in->error) ||
         !alb_node_number(&sphere.radius_mm, node, "radius_mm", 1e-6, ALB_SCENE_LONGEST_MM, in->error) ||
         !alb_scene_vector(&sphere.centre_mm, node, "centre_mm", in->error) ||
         !alb_node_integer(&subdivisions, node, "subdivisions", 0, 8, in->error) ||
@@ -104,8 +106,8 @@ static bool note_object(alb_object *object, const alb_mesh *placed, alb_scene_re
     int role = 0;
     if (alb_node_has(node, "shadow") && !alb_node_choice(&role, node, "shadow", roles, 2, in->error))
         return false;
-    *object = (alb_object){in->scene->mesh.vertex_count, placed->vertex_count, role == 1};
-    return true;
+    *object = (alb_object){in->scene->mesh.vertex_count, placed->vertex_count, role == 1, false};
+    return !alb_node_has(node, "rigid") || alb_node_boolean(&object->rigid, node, "rigid", in->error);
 }
 
 static bool read_object(alb_scene_reader *in, alb_node node)

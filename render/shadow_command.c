@@ -18,7 +18,9 @@ typedef struct sequence {
     targets to;
     alb_shadow_stage stage;
     double exposure, wanted_percent; // 0: none yet, none stated
-    double error_percent, upper_percent, small_share;
+    alb_shadow_verdict verdict;
+    double small_share;
+    double transport_s;                 // once
     double sampling_s, light_s, view_s; // of all frames
     int frames;
 } sequence;
@@ -73,7 +75,7 @@ static bool write_frame(sequence *s, const alb_scene *scene, const alb_provenanc
 static bool light_first(sequence *s, const alb_scene *scene, alb_error *error)
 {
     if (s->wanted_percent > 0) {
-        if (!alb_shadow_advise(&s->stage, &s->upper_percent, scene, s->wanted_percent, scene->seed, error))
+        if (!alb_shadow_advise(&s->stage, &s->verdict, scene, s->wanted_percent, scene->seed, error))
             return false;
     } else if (!alb_shadow_stage_light(&s->stage, scene, error))
         return false;
@@ -84,7 +86,7 @@ static bool light_first(sequence *s, const alb_scene *scene, alb_error *error)
                 "render: from %.0f %% of the vertices a light is less than %d degrees in half-angle: its shadows are "
                 "blurred\n",
                 100 * s->small_share, ALB_SHADOW_SMALL_DEG);
-    return alb_shadow_error(&s->error_percent, &s->upper_percent, &s->stage, scene, scene->seed, error);
+    return alb_shadow_error(&s->verdict, &s->stage, scene, scene->seed, error);
 }
 
 static bool render_frame(sequence *s, int frame, alb_error *error)
@@ -101,11 +103,25 @@ static bool render_frame(sequence *s, int frame, alb_error *error)
     const double start_s = alb_clock_s();
     ok = ok && write_frame(s, &scene, &provenance, frame, error);
     s->view_s += alb_clock_s() - start_s;
+    s->transport_s = s->stage.transport_s;
     s->sampling_s += s->stage.sampling_s;
     s->light_s += s->stage.light_s;
     s->frames = scene.frames;
     alb_scene_free(&scene);
     return ok;
+}
+
+// Whether fields were the right choice.
+static void print_choice(const sequence *s)
+{
+    const double frame_s = (s->sampling_s + s->light_s) / s->frames, times = s->verdict.rays_s / frame_s;
+    if (!(times > 0))
+        return;
+    printf("rays of that error, %.0f a vertex, would take %.0f ms a frame: ", s->verdict.rays, 1e3 * s->verdict.rays_s);
+    if (times > 1)
+        printf("%.0f times as long\n", times);
+    else
+        printf("cast rays here, or render by radiosity\n");
 }
 
 static bool report(const sequence *s, bool as_json, alb_error *error)
@@ -115,8 +131,9 @@ static bool report(const sequence *s, bool as_json, alb_error *error)
         printf(
             "%s: %d frames, %zu vertices, %zu occluders, stated error %.2g %% (within %.2g %%), %.1f ms sampling and "
             "%.1f ms lighting a frame\n",
-            s->to.picture, s->frames, s->stage.vertex_count, s->stage.occluder_count, s->error_percent,
-            s->upper_percent, 1e3 * s->sampling_s / s->frames, 1e3 * s->light_s / s->frames);
+            s->to.picture, s->frames, s->stage.vertex_count, s->stage.occluder_count, s->verdict.percent,
+            s->verdict.upper_percent, 1e3 * s->sampling_s / s->frames, 1e3 * s->light_s / s->frames);
+        print_choice(s);
         return true;
     }
     alb_json json;
@@ -125,14 +142,18 @@ static bool report(const sequence *s, bool as_json, alb_error *error)
     alb_json_integer(&json, "vertices", (long)s->stage.vertex_count);
     alb_json_integer(&json, "occluders", (long)s->stage.occluder_count);
     alb_json_integer(&json, "lights", (long)s->stage.light_count);
+    alb_json_integer(&json, "transport_vertices", (long)s->stage.transport.row_count);
     alb_json_integer(&json, "order", settings->order);
     alb_json_integer(&json, "cells", settings->cells);
     alb_json_integer(&json, "shells_outside", settings->outer);
     alb_json_integer(&json, "shells_inside", settings->inner);
-    alb_json_number(&json, "stated_error_percent", s->error_percent);
-    alb_json_number(&json, "upper_error_percent", s->upper_percent);
+    alb_json_number(&json, "stated_error_percent", s->verdict.percent);
+    alb_json_number(&json, "upper_error_percent", s->verdict.upper_percent);
+    alb_json_number(&json, "rays_of_that_error", s->verdict.rays);
     alb_json_number(&json, "small_light_share", s->small_share);
     alb_json_object(&json, "seconds");
+    alb_json_number(&json, "transport", s->transport_s);
+    alb_json_number(&json, "rays_of_that_error", s->verdict.rays_s);
     alb_json_number(&json, "sampling", s->sampling_s);
     alb_json_number(&json, "lighting", s->light_s);
     alb_json_number(&json, "view", s->view_s);

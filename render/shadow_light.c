@@ -20,6 +20,7 @@
 #include "base/progress.h"
 #include "render/sh_product.h"
 #include "render/sh_rotate.h"
+#include "render/sh_zonal.h"
 #include "render/shadow_receivers.h"
 #include <omp.h>
 #include <stdlib.h>
@@ -30,9 +31,11 @@ static const double constant_one = 3.5449077018110318; // sqrt(4 pi)
 
 // A block of receivers, structures of arrays.
 typedef struct block {
-    size_t count;
+    size_t first, count;
     alb_vector points[BLOCK], normals[BLOCK];
     float cosine[VALUES * BLOCK];                         // max(0, n.d)
+    float lobe[ALB_SH_COUNT_MAX * BLOCK];                 // the same, or precomputed transport: what skies light
+    bool in_body[BLOCK];                                  // receivers with transport
     double distances_mm[ALB_SHADOW_OCCLUDERS_MAX][BLOCK]; // to the occluders' centres
     float shares[ALB_SHADOW_OCCLUDERS_MAX][BLOCK];        // of the occlusion that is above the horizon
     bool hides[ALB_SHADOW_OCCLUDERS_MAX];                 // any of the shares is not 0
@@ -40,20 +43,25 @@ typedef struct block {
     alb_shadow_seconds seconds;
 } block;
 
-static void set_cosine(block *b)
+static void set_lobes(block *b, const alb_shadow_world *world)
 {
-    static const double lobe[ORDER] = {M_PI, 2 * M_PI / 3, M_PI / 4, 0}; // zonal: A_l of Ramamoorthi & Hanrahan 2001
+    double zonal[ALB_SH_ORDER_MAX];
     float normals[3 * BLOCK];
+    alb_sh_zonal_cosine(zonal, ALB_SH_ORDER_MAX);
     for (size_t r = 0; r < b->count; r++) {
         normals[r] = (float)b->normals[r].x;
         normals[BLOCK + r] = (float)b->normals[r].y;
         normals[2 * BLOCK + r] = (float)b->normals[r].z;
     }
-    alb_sh_evaluate_batch(b->cosine, ORDER, normals, BLOCK, b->count);
-    for (int l = 0; l < ORDER; l++)
+    alb_sh_evaluate_batch(b->lobe, ALB_SH_ORDER_MAX, normals, BLOCK, b->count);
+    for (int l = 0; l < ALB_SH_ORDER_MAX; l++)
         for (int i = l * l; i < (l + 1) * (l + 1); i++)
             for (size_t r = 0; r < b->count; r++)
-                b->cosine[(size_t)i * BLOCK + r] *= (float)lobe[l];
+                b->lobe[(size_t)i * BLOCK + r] *= (float)(sqrt(4 * M_PI / (2 * l + 1)) * zonal[l]);
+    memcpy(b->cosine, b->lobe, sizeof b->cosine);
+    memset(b->in_body, 0, sizeof b->in_body);
+    if (world->transport)
+        alb_shadow_transport_lobes(b->lobe, b->in_body, world->transport, b->first, b->count);
 }
 
 // Where receivers look the field up: from within its sphere a tenth of the radius above their surface, for the nodes
@@ -65,6 +73,12 @@ static void look_up_above(alb_vector *points, const block *b, const alb_shadow_s
         const double rise_mm = 0.1 * sphere->radius_mm * fmin(fmax(4 * (1 - x), 0), 1);
         points[r] = alb_add(b->points[r], alb_times(rise_mm, b->normals[r]));
     }
+}
+
+// Transport knows what the body hides of the skies from itself.
+static bool counts(const block *b, const alb_shadow_world *world, size_t occluder, size_t receiver, bool sky)
+{
+    return !(sky && b->in_body[receiver] && world->of_body[occluder]);
 }
 
 static void find_occlusions(block *b, const alb_shadow_world *world)
@@ -80,7 +94,7 @@ static void find_occlusions(block *b, const alb_shadow_world *world)
         memcpy(b->distances_mm[o], v.distances_mm, sizeof v.distances_mm);
         for (size_t r = 0; r < b->count; r++) { // the height of the sphere's top above the horizon, in radii
             const double top = 1 - alb_dot(v.directions[r], b->normals[r]) * b->distances_mm[o][r] / radius;
-            b->shares[o][r] = (float)fmin(fmax(1 + 10 * top, 0), 1);
+            b->shares[o][r] = counts(b, world, o, r, !world->light_count) ? (float)fmin(fmax(1 + 10 * top, 0), 1) : 0;
             b->hides[o] |= b->shares[o][r] > 0;
         }
         if (!b->hides[o])
@@ -122,7 +136,7 @@ static double share_before(const alb_shadow_sphere *occluder, const alb_shadow_s
 // horizon.
 static void set_lobe(float *out, const block *b, const alb_shadow_sphere *light)
 {
-    memcpy(out, b->cosine, sizeof b->cosine);
+    memcpy(out, light ? b->cosine : b->lobe, sizeof b->cosine);
     for (size_t r = 0; light && r < b->count; r++) {
         const double height = alb_dot(alb_sub(light->centre_mm, b->points[r]), b->normals[r]) / light->radius_mm;
         const float above = (float)fmin(fmax(2 * height - 1, 0), 1);
@@ -142,7 +156,7 @@ static void find_transfer(float *out, const block *b, const alb_shadow_world *wo
     for (size_t s = 0; s < stages; s++) {
         for (size_t r = 0; r < b->count; r++) {
             const size_t o = order[s][r];
-            float share = b->shares[o][r];
+            float share = counts(b, world, o, r, !light) ? b->shares[o][r] : 0;
             if (light)
                 share *= (float)share_before(&world->occluders[o].sphere, light, b->distances_mm[o][r], light_mm[r]);
             for (size_t i = 0; i < VALUES; i++)
@@ -188,7 +202,7 @@ static void add_light(float (*irradiance)[3], const block *b, const alb_shadow_w
     alb_shadow_receivers_at(&v, light, b->points, b->count);
     find_transfer(transfer, b, world, &light->sphere, v.distances_mm);
     alb_sh_to_axis_batch(transfer, transfer, ORDER, v.axes, BLOCK, b->count);
-    for (int shell = 0; shell < light->shells; shell++)
+    for (int shell = 0; shell < light->shell_count; shell++)
         if (alb_shadow_receivers_weigh(&v, light, shell))
             add_shell(sum, transfer, &v, light, shell, &world->laws->light, b->count);
     for (size_t r = 0; r < b->count; r++)
@@ -196,39 +210,17 @@ static void add_light(float (*irradiance)[3], const block *b, const alb_shadow_w
             irradiance[r][c] += sum[r][c] > 0 ? sum[r][c] : 0;
 }
 
-// The transfer as weights of what is seen from the sky's centre.
-static void move_to_centre(float *out, float *transfer, const block *b, const alb_shadow_sky *sky,
-                           const alb_sh_batch *law)
-{
-    float axes[3 * BLOCK], k[BLOCK];
-    for (size_t r = 0; r < b->count; r++) {
-        const alb_vector off = alb_sub(b->points[r], sky->centre_mm);
-        const double distance = alb_length(off);
-        const alb_vector d = distance > 0 ? alb_times(1 / distance, off) : (alb_vector){0, 0, 1};
-        axes[r] = (float)d.x, axes[BLOCK + r] = (float)d.y, axes[2 * BLOCK + r] = (float)d.z;
-        k[r] = (float)(distance / sky->radius_mm);
-    }
-    alb_sh_to_axis_batch(transfer, transfer, ORDER, axes, BLOCK, b->count);
-    alb_sh_batch_apply(out, law, true, k, transfer, BLOCK, b->count);
-    alb_sh_from_axis_batch(out, out, ALB_SH_ORDER_MAX, axes, BLOCK, b->count);
-}
-
+// The bands of the lobe beyond order 4 fade with what the occluders leave of its mean.
 static void add_sky(float (*irradiance)[3], const block *b, const alb_shadow_world *world, const alb_shadow_sky *sky)
 {
-    float transfer[VALUES * BLOCK], weights[ALB_SH_COUNT_MAX * BLOCK];
+    float transfer[ALB_SH_COUNT_MAX * BLOCK];
     find_transfer(transfer, b, world, NULL, NULL);
-    const bool finite = sky->radius_mm > 0;
-    if (finite)
-        move_to_centre(weights, transfer, b, sky, &world->laws->sky);
-    const float *from = finite ? weights : transfer;
-    for (int c = 0; c < 3; c++) {
-        float sum[BLOCK] = {0};
-        for (int i = 0; i < sky->order * sky->order; i++)
-            for (size_t r = 0; r < b->count; r++)
-                sum[r] += from[(size_t)i * BLOCK + r] * sky->radiance[c][i];
-        for (size_t r = 0; r < b->count; r++)
-            irradiance[r][c] += sum[r] > 0 ? sum[r] : 0;
+    for (size_t r = 0; r < b->count; r++) {
+        const float left = fminf(fmaxf(transfer[r] / b->lobe[r], 0), 1);
+        for (size_t i = VALUES; i < ALB_SH_COUNT_MAX; i++)
+            transfer[i * BLOCK + r] = left * b->lobe[i * BLOCK + r];
     }
+    alb_shadow_sky_add(irradiance, sky, &world->laws->sky, transfer, b->points, b->count);
 }
 
 static bool check(const alb_shadow_world *world, const alb_vector *points, size_t count, alb_error *error)
@@ -254,7 +246,7 @@ static void light_block(float (*irradiance)[3], block *b, const alb_shadow_world
 {
     memset(irradiance, 0, b->count * sizeof *irradiance);
     const double start_s = alb_clock_s();
-    set_cosine(b);
+    set_lobes(b, world);
     find_occlusions(b, world);
     const double found_s = alb_clock_s();
     for (size_t j = 0; j < world->light_count; j++)
@@ -280,6 +272,7 @@ bool alb_shadow_irradiance(float (*irradiance)[3], const alb_shadow_world *world
         const size_t thread = (size_t)omp_get_thread_num(), first = k * BLOCK;
         block *b = &blocks[thread];
         b->occlusion = occlusion + thread * per_thread;
+        b->first = first;
         b->count = count - first < BLOCK ? count - first : BLOCK;
         memcpy(b->points, points + first, b->count * sizeof *points);
         memcpy(b->normals, normals + first, b->count * sizeof *normals);

@@ -1,18 +1,9 @@
 // Irradiance of receivers from skies and lights with fields, in the soft shadows of occluders with fields.
 #pragma once
-#include "render/light.h"
 #include "render/shadow_field.h"
 #include "render/shadow_laws.h"
-
-// An environment as spherical harmonics: radiance seen from the middle.
-typedef struct alb_shadow_sky {
-    int order; // 1 to ALB_SH_ORDER_MAX; 4 where it is infinitely far away
-    float radiance[3][ALB_SH_COUNT_MAX];
-    alb_vector centre_mm; // of the sphere on which it lies
-    double radius_mm;     // 0: infinitely far away
-} alb_shadow_sky;
-// Of an environment light. Where it has a radius more bands are kept: nearer to the wall more of them are seen.
-bool alb_shadow_sky_create(alb_shadow_sky *sky, const alb_light *environment, alb_error *error);
+#include "render/shadow_sky.h"
+#include "render/shadow_transport.h"
 
 enum { ALB_SHADOW_OCCLUDERS_MAX = 64 };
 
@@ -22,6 +13,8 @@ typedef struct alb_shadow_world {
     const alb_shadow_sky *skies;
     size_t occluder_count, light_count, sky_count; // at most ALB_SHADOW_OCCLUDERS_MAX occluders
     const alb_shadow_laws *laws;
+    const alb_shadow_transport *transport; // NULL: none; else receivers are the vertices it was made for
+    const bool *of_body;                   // whether each occluder belongs to its body
 } alb_shadow_world;
 
 // Seconds summed over threads: looking up and scaling of samples; products with all that follows.

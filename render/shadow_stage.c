@@ -50,6 +50,7 @@ static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o,
         settings = alb_shadow_light_settings;
     stage->objects[index] = o;
     snprintf(stage->names[index], sizeof *stage->names, "object %zu", o);
+    stage->of_body[index] = scene->objects[o].rigid && !light;
     const bool ok = cut_out(&mesh, &radiance, scene, &scene->objects[o], error) &&
                     alb_shadow_field_create(&stage->fields[index], &settings, &mesh,
                                             light ? (const float(*)[3])radiance : NULL, stage->names[index], error);
@@ -80,6 +81,8 @@ static void free_fields(alb_shadow_stage *stage)
     free(stage->groups);
     free(stage->normals);
     free(stage->irradiance);
+    free(stage->of_body);
+    alb_shadow_transport_free(&stage->transport);
     const alb_shadow_stage kept = *stage;
     *stage = (alb_shadow_stage){.settings = kept.settings,
                                 .paper = kept.paper,
@@ -103,6 +106,39 @@ void alb_shadow_stage_set(alb_shadow_stage *stage, const alb_shadow_settings *se
     stage->settings = *settings;
 }
 
+static void set_normals(alb_vector *normals, const alb_mesh *mesh)
+{
+    memset(normals, 0, mesh->vertex_count * sizeof *normals);
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        const uint32_t *v = mesh->faces[f];
+        const alb_vector a = mesh->vertices[v[0]],
+                         twice = alb_cross(alb_sub(mesh->vertices[v[1]], a), alb_sub(mesh->vertices[v[2]], a));
+        for (int k = 0; k < 3; k++)
+            normals[v[k]] = alb_add(normals[v[k]], twice);
+    }
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        normals[i] = alb_unit(normals[i]);
+        if (!(alb_dot(normals[i], normals[i]) > 0)) // no face, or faces back to back
+            normals[i] = (alb_vector){0, 0, 1};
+    }
+}
+
+// What is rigid and does not shine, if skies light it.
+static bool create_transport(alb_shadow_stage *stage, const alb_scene *scene, const bool *shines, alb_error *error)
+{
+    const double start_s = alb_clock_s();
+    bool *of_body = alb_allocate(scene->object_count, sizeof *of_body, error), any = false, ok = of_body;
+    for (size_t o = 0; ok && o < scene->object_count; o++)
+        any |= of_body[o] = scene->objects[o].rigid && !shines[o] && stage->sky_count;
+    if (any) {
+        set_normals(stage->normals, &scene->mesh);
+        ok = alb_shadow_transport_create(&stage->transport, scene, of_body, stage->normals, error);
+    }
+    stage->transport_s = alb_clock_s() - start_s;
+    free(of_body);
+    return ok;
+}
+
 static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
 {
     const alb_mesh *mesh = &scene->mesh;
@@ -111,6 +147,7 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
     bool ok = (stage->fields = alb_allocate(n, sizeof *stage->fields, error)) &&
               (stage->objects = alb_allocate(n, sizeof *stage->objects, error)) &&
               (stage->names = alb_allocate(n, sizeof *stage->names, error)) &&
+              (stage->of_body = alb_allocate(n, sizeof *stage->of_body, error)) &&
               (stage->faces = alb_allocate(mesh->face_count, sizeof *stage->faces, error)) &&
               (stage->groups = alb_allocate(mesh->face_count, sizeof *stage->groups, error)) &&
               (stage->normals = alb_allocate(mesh->vertex_count, sizeof *stage->normals, error)) &&
@@ -120,6 +157,7 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
         for (size_t o = 0; ok && o < n; o++)
             if (shines[o] == (light == 1) && (light || !scene->objects[o].receives_only))
                 ok = add_field(stage, scene, o, light, error);
+    ok = ok && create_transport(stage, scene, shines, error);
     free(shines);
     if (!ok)
         return false;
@@ -163,23 +201,6 @@ static bool read_skies(alb_shadow_stage *stage, const alb_scene *scene, alb_erro
     return true;
 }
 
-static void set_normals(alb_vector *normals, const alb_mesh *mesh)
-{
-    memset(normals, 0, mesh->vertex_count * sizeof *normals);
-    for (size_t f = 0; f < mesh->face_count; f++) {
-        const uint32_t *v = mesh->faces[f];
-        const alb_vector a = mesh->vertices[v[0]],
-                         twice = alb_cross(alb_sub(mesh->vertices[v[1]], a), alb_sub(mesh->vertices[v[2]], a));
-        for (int k = 0; k < 3; k++)
-            normals[v[k]] = alb_add(normals[v[k]], twice);
-    }
-    for (size_t i = 0; i < mesh->vertex_count; i++) {
-        normals[i] = alb_unit(normals[i]);
-        if (!(alb_dot(normals[i], normals[i]) > 0)) // no face, or faces back to back
-            normals[i] = (alb_vector){0, 0, 1};
-    }
-}
-
 alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage)
 {
     return (alb_shadow_world){.occluders = stage->fields,
@@ -188,20 +209,25 @@ alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage)
                               .light_count = stage->light_count,
                               .skies = stage->skies,
                               .sky_count = stage->sky_count,
-                              .laws = &stage->laws};
+                              .laws = &stage->laws,
+                              .transport = stage->transport.row_count ? &stage->transport : NULL,
+                              .of_body = stage->of_body};
 }
 
 bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
 {
     const double start_s = alb_clock_s();
     const alb_mesh *mesh = &scene->mesh;
+    double made_s = 0;
     bool ok = read_skies(stage, scene, error);
     if (ok && !still_fits(stage, mesh)) {
         free_fields(stage);
         ok = create_fields(stage, scene, error);
+        made_s = stage->transport_s;
     }
     if (ok && !stage->light_count && !stage->sky_count)
         ok = alb_fail(error, ALB_BAD_DATA, "there is no light: no environment and no object that emits");
+    ok = ok && alb_shadow_transport_follow(&stage->transport, mesh->vertices, error);
     for (size_t i = 0; ok && i < stage->occluder_count + stage->light_count; i++)
         ok = alb_shadow_field_sample(&stage->fields[i], mesh->vertices + scene->objects[stage->objects[i]].first_vertex,
                                      error);
@@ -213,7 +239,7 @@ bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb
         ok = alb_shadow_irradiance(stage->irradiance, &world, mesh->vertices, stage->normals, mesh->vertex_count,
                                    &stage->seconds, error);
     }
-    stage->sampling_s = sampled_s - start_s;
+    stage->sampling_s = sampled_s - start_s - made_s;
     stage->light_s = alb_clock_s() - sampled_s;
     if (!ok)
         free_fields(stage);

@@ -13,12 +13,15 @@ typedef struct alb_shadow_stage {
     size_t *objects;          // index of each in the scene
     char (*names)[32];
     size_t occluder_count, light_count;
+    alb_shadow_transport transport; // of what is rigid, for the skies
+    bool *of_body;                  // whether each occluder is part of it
     alb_shadow_sky *skies;
     size_t sky_count;
     alb_shadow_laws laws;
     int laws_order;             // for which they were made; 0: none
     alb_vector *normals;        // of the vertices: means over their faces by area
     float (*irradiance)[3];     // of the vertices
+    double transport_s;         // of making it
     double sampling_s, light_s; // of the latest frame
     alb_shadow_seconds seconds; // of light_s, by threads
 } alb_shadow_stage;
@@ -26,7 +29,7 @@ typedef struct alb_shadow_stage {
 // Lights every vertex of the scene. A stage starts with all zero but settings and paper. Frames of a sequence keep
 // their fields, and with them their bounding spheres, as long as the faces stay the same. Fails where a light is a
 // point, a spot or a projector, which have no soft shadows (ALB_BAD_DATA), where there is no light at all, and where
-// its parts fail; the stage then makes new fields at the next try.
+// its parts fail, also where what is rigid does not move as one body; the stage then makes new fields at the next try.
 bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error);
 void alb_shadow_stage_free(alb_shadow_stage *stage);
 // Other settings from the next frame on.

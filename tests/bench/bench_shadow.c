@@ -2,31 +2,39 @@
 // against time beside casting rays. Prints both tables, draws the chart and, beside it as CHART.png, one frame of each:
 // bench.shadow CHART.svg [frames, 20]
 //
-// A frame: the meshes are given; spheres and pictures of all that moves, every vertex lit. Error: rms of the irradiance
-// over 2000 vertices (not of lights, not inside others) against 4096 rays each, in percent of the mean, worst of three
-// frames. Rays are cast from the same vertices on as many cores; their time is that of every vertex.
+// A frame: the meshes are given; spheres and pictures of all that moves, every vertex lit. Times are those that all
+// threads take together over their number: the frame's on cores of its own, also where others use them. Error: rms of
+// the irradiance over 2000 vertices (not of lights, not inside others) against 4096 rays each, in percent of the mean,
+// worst of three frames. Rays are cast from the same vertices on as many cores; their time is that of every vertex.
 #include "base/plot.h"
-#include "base/progress.h"
 #include "base/random.h"
 #include "render/shadow_picture.h"
 #include "render/shadow_rays.h"
 #include "render/shadow_stage.h"
 #include "render/view.h"
 #include "scenes/shadow_scenes.h"
+#include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
-enum { SAMPLES = 2000, WAYS = 6, RAYS = 4, CHECKED = 3 };
+enum { SAMPLES = 2000, WAYS = 8, RAYS = 4, CHECKED = 3, SHADE = 160 };
 
 static const struct {
     const char *name;
-    bool paper;
+    bool paper, regressed, transport;
     int order, outer, inner, cells, pixels;
     double cluster;
-} ways[WAYS] = {{"as printed", true, 4, 1, 0, 8, 32, 0},   {"windowed", false, 4, 1, 0, 8, 64, 0.04},
-                {"2 shells", false, 4, 2, 0, 8, 64, 0.04}, {"order 8 to 4", false, 8, 1, 0, 8, 64, 0.04},
-                {"4 shells", false, 4, 2, 2, 8, 64, 0.04}, {"4 shells, order 8", false, 8, 2, 2, 12, 64, 0.02}};
+} ways[WAYS] = {{"as printed", true, false, false, 4, 1, 0, 8, 32, 0},
+                {"windowed", false, false, false, 4, 1, 0, 8, 64, 0.04},
+                {"regressed", false, true, false, 4, 1, 0, 8, 64, 0.04},
+                {"order 8 to 4", false, false, false, 8, 1, 0, 8, 64, 0.04},
+                {"2 shells", false, false, false, 4, 2, 0, 8, 64, 0.04},
+                {"4 shells", false, false, false, 4, 1, 2, 8, 64, 0.04},
+                {"4 shells, order 8", false, false, false, 8, 1, 2, 12, 64, 0.02},
+                {"transport", false, false, true, 4, 1, 0, 8, 64, 0.04}};
+#define BOTTOM 0.3 // percent, of the chart
 static const int strata[RAYS] = {4, 8, 16, 32};
 
 typedef struct result {
@@ -41,16 +49,43 @@ typedef struct truth {
     float (*radiance)[3];
 } truth;
 
+static double now_s(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return ((double)now.tv_sec + 1e-9 * (double)now.tv_nsec) / omp_get_max_threads();
+}
+
+static bool take_regressed(alb_shadow_stage *stage, alb_error *error)
+{
+    const alb_sh_law law = {ALB_SH_LAW_REGRESSED, ALB_SH_MAP_CONE, 45, 4, 4};
+    alb_sh_batch_free(&stage->laws.outer);
+    return alb_sh_batch_create(&stage->laws.outer, &law, 256, error);
+}
+
+static bool has_rigid(const alb_scene *scene) { return scene->objects[scene->object_count - 1].rigid; }
+
 static alb_shadow_stage stage_of(int way)
 {
     alb_shadow_stage stage = {.settings = alb_shadow_defaults, .paper = ways[way].paper};
     stage.settings.order = ways[way].order;
     stage.settings.outer = ways[way].outer;
     stage.settings.inner = ways[way].inner;
+    stage.settings.far = ways[way].inner > 0;
     stage.settings.cells = ways[way].cells;
     stage.settings.pixels = ways[way].pixels;
     stage.settings.cluster = ways[way].cluster;
     return stage;
+}
+
+// Rigid objects get precomputed transport in the way of that name alone.
+static bool create_scene(alb_scene *scene, int index, int frame, int way, alb_error *error)
+{
+    if (!shadow_scenes[index].create(scene, frame, error))
+        return false;
+    for (size_t o = 0; o < scene->object_count; o++)
+        scene->objects[o].rigid &= ways[way].transport;
+    return true;
 }
 
 static bool in_light(const alb_shadow_stage *stage, const alb_scene *scene, size_t vertex)
@@ -129,19 +164,25 @@ static bool run_way(result *out, int scene_index, int way, int frames, alb_error
     for (int n = -1; ok && n < frames; n++) {
         alb_scene scene;
         const int frame = (n + 1) * which->frames / (frames + 1);
-        if (!which->create(&scene, frame, error)) {
+        if (!create_scene(&scene, scene_index, frame, way, error)) {
             ok = false;
             break;
         }
-        const double start_s = alb_clock_s();
+        if (ways[way].transport && !has_rigid(&scene)) { // it has none
+            alb_scene_free(&scene);
+            break;
+        }
+        const double start_s = now_s();
         ok = alb_shadow_stage_light(&stage, &scene, error);
         if (n >= 0) { // the first makes the tables and fields
-            times[n] = alb_clock_s() - start_s;
-            const double share = stage.light_s / (stage.seconds.scaling + stage.seconds.products) / frames;
-            out->sampling_ms += 1e3 * stage.sampling_s / frames;
-            out->scaling_ms += 1e3 * share * stage.seconds.scaling;
-            out->products_ms += 1e3 * share * stage.seconds.products;
-        }
+            times[n] = now_s() - start_s;
+            const double share = times[n] / (stage.sampling_s + stage.light_s) * 1e3 / frames;
+            const double light = stage.light_s / (stage.seconds.scaling + stage.seconds.products);
+            out->sampling_ms += share * stage.sampling_s;
+            out->scaling_ms += share * light * stage.seconds.scaling;
+            out->products_ms += share * light * stage.seconds.products;
+        } else if (ok && ways[way].regressed)
+            ok = take_regressed(&stage, error);
         if (ok && n >= 0 && n % ((frames + CHECKED - 1) / CHECKED) == 0) {
             static truth t;
             static float found[SAMPLES][3];
@@ -168,22 +209,24 @@ static bool run_way(result *out, int scene_index, int way, int frames, alb_error
     return ok;
 }
 
-static bool run_rays(double *ms, double *percent, int scene_index, alb_error *error)
+static bool run_rays(double *ms, double (*percent)[RAYS], int scene_index, alb_error *error)
 {
     const shadow_scene *which = &shadow_scenes[scene_index];
     alb_scene scene;
     alb_shadow_stage stage = stage_of(1);
     static truth t;
     static float found[SAMPLES][3];
-    bool ok = which->create(&scene, which->frames / 6, error) && alb_shadow_stage_light(&stage, &scene, error) &&
-              find_truth(&t, &stage, &scene, error);
+    bool ok = create_scene(&scene, scene_index, which->frames / 6, 1, error) &&
+              alb_shadow_stage_light(&stage, &scene, error) && find_truth(&t, &stage, &scene, error);
     for (int k = 0; ok && k < RAYS; k++) {
-        const double start_s = alb_clock_s();
+        const double start_s = now_s();
         alb_shadow_cast(found, &t.tracer, (const float(*)[3])t.radiance, scene.lights, scene.light_count, t.points,
                         t.normals, t.count, strata[k], 256 * t.tracer.slack_mm, 77);
-        ms[k] = 1e3 * (alb_clock_s() - start_s) * (double)scene.mesh.vertex_count / (double)t.count;
-        percent[k] = error_of(&t, (const float(*)[3])found, scene.objects[0].vertex_count, false);
-        printf("%-8s %4d rays          %9.1f ms   %6.2f %%\n", which->name, strata[k] * strata[k], ms[k], percent[k]);
+        ms[k] = 1e3 * (now_s() - start_s) * (double)scene.mesh.vertex_count / (double)t.count;
+        for (int model = 0; model < 2; model++)
+            percent[model][k] = error_of(&t, (const float(*)[3])found, scene.objects[0].vertex_count, model);
+        printf("%-8s %4d rays %53.1f %21.2f %10.2f\n", which->name, strata[k] * strata[k], ms[k], percent[0][k],
+               percent[1][k]);
     }
     free_truth(&t);
     alb_shadow_stage_free(&stage);
@@ -191,36 +234,93 @@ static bool run_rays(double *ms, double *percent, int scene_index, alb_error *er
     return ok;
 }
 
-static bool chart(const char *path, double (*ms)[WAYS], double (*percent)[SHADOW_SCENES][WAYS], double (*ray_ms)[RAYS],
-                  double (*ray_percent)[RAYS], alb_error *error)
+// Time that rays take for an error: straight lines between the logarithms, and beyond the last.
+static double ray_time(const double *ms, const double *percent, double wanted)
 {
-    alb_curve curves[SHADOW_SCENES][3];
+    int k = 0;
+    while (k + 2 < RAYS && percent[k + 1] > wanted)
+        k++;
+    return ms[k] * pow(ms[k + 1] / ms[k], log(wanted / percent[k]) / log(percent[k + 1] / percent[k]));
+}
+
+// Above the line of the rays they are as good in less time: hatched, up and down.
+static void shade(double *x, double *y, const double *ms, const double *percent, double top)
+{
+    for (int n = 0; n < SHADE; n++) {
+        y[2 * n] = percent[0] * pow(BOTTOM / percent[0], (double)n / (SHADE - 1));
+        x[2 * n] = x[2 * n + 1] = ray_time(ms, percent, y[2 * n]);
+        y[2 * n + 1] = top;
+        if (n % 2) {
+            const double swap = y[2 * n];
+            y[2 * n] = y[2 * n + 1], y[2 * n + 1] = swap;
+        }
+    }
+}
+
+typedef struct figures {
+    double ms[SHADOW_SCENES][WAYS], percent[SHADOW_SCENES][WAYS][2];
+    double ray_ms[SHADOW_SCENES][RAYS], ray_percent[SHADOW_SCENES][2][RAYS];
+} figures;
+
+static bool chart(const char *path, const figures *f, alb_error *error)
+{
+    static const char *const colours[WAYS] = {"#d62728", "#1f77b4", "#17becf", "#9467bd",
+                                              "#2ca02c", "#8c564b", "#e377c2", "#000"};
+    static double shade_x[SHADOW_SCENES][2 * SHADE], shade_y[SHADOW_SCENES][2 * SHADE], twice[SHADOW_SCENES][WAYS][2];
+    alb_curve curves[SHADOW_SCENES][WAYS + 3];
     alb_panel panels[SHADOW_SCENES];
-    char titles[SHADOW_SCENES][160];
+    char titles[SHADOW_SCENES][128];
     for (int i = 0; i < SHADOW_SCENES; i++) {
-        snprintf(titles[i], sizeof titles[i],
-                 "%s (as printed, windowed, 2 shells, order 8, 4 shells, 4 shells order 8)", shadow_scenes[i].what);
-        for (int k = 0; k < 2; k++)
-            curves[i][k] = (alb_curve){.label = k ? "fields, on the model" : "fields, on the ground",
-                                       .x = ms[i],
-                                       .y = percent[k][i],
-                                       .count = WAYS,
-                                       .mark = ALB_MARK_POINTS};
-        curves[i][2] = (alb_curve){.label = "16 to 1024 rays, on the ground",
-                                   .x = ray_ms[i],
-                                   .y = ray_percent[i],
-                                   .count = RAYS,
-                                   .mark = ALB_MARK_LINE_AND_POINTS};
+        const bool first = i == 0;
+        alb_curve *c = curves[i];
+        shade(shade_x[i], shade_y[i], f->ray_ms[i], f->ray_percent[i][0], 100);
+        *c++ =
+            (alb_curve){first ? "here rays win" : NULL, "#ddd", shade_x[i], shade_y[i], NULL, 2 * SHADE, ALB_MARK_LINE};
+        for (int model = 0; model < 2; model++)
+            *c++ = (alb_curve){.label = !first  ? NULL
+                                        : model ? "rays, model"
+                                                : "16 to 1024 rays, plane",
+                               .colour = "#777",
+                               .x = f->ray_ms[i],
+                               .y = f->ray_percent[i][model],
+                               .count = RAYS,
+                               .mark = model ? ALB_MARK_DASHES : ALB_MARK_LINE_AND_POINTS};
+        for (int w = 0; w < WAYS; w++) {
+            twice[i][w][0] = twice[i][w][1] = f->ms[i][w];
+            *c++ = (alb_curve){.label = first ? ways[w].name : NULL,
+                               .colour = colours[w],
+                               .x = twice[i][w],
+                               .y = f->percent[i][w],
+                               .count = 2,
+                               .mark = ALB_MARK_LINE_AND_POINTS};
+        }
+        snprintf(titles[i], sizeof titles[i], "%s: plane (below) to model (above)", shadow_scenes[i].name);
         panels[i] = (alb_panel){.title = titles[i],
                                 .x_label = i == SHADOW_SCENES - 1 ? "ms a frame" : NULL,
-                                .y_label = "error, %",
+                                .y_label = "error, % of mean",
                                 .log_x = true,
                                 .log_y = true,
+                                .y_minimum = BOTTOM,
+                                .y_maximum = 100,
                                 .curves = curves[i],
-                                .curve_count = 3,
+                                .curve_count = WAYS + 3,
                                 .height = 1};
     }
-    return alb_plot_write(path, panels, SHADOW_SCENES, 800, 1100, error);
+    return alb_plot_write(path, panels, SHADOW_SCENES, 800, 1200, error);
+}
+
+// Of each way the time of rays with its error on the plane and on the model.
+static void compare(const figures *f)
+{
+    for (int i = 0; i < SHADOW_SCENES; i++)
+        for (int w = 0; w < WAYS; w++)
+            for (int model = 0; model < 2 && f->ms[i][w] > 0; model++) {
+                const double rays = ray_time(f->ray_ms[i], f->ray_percent[i][model], f->percent[i][w][model]),
+                             times = rays / f->ms[i][w];
+                printf("%-8s %-17s on the %s: %5.2f %% takes rays %8.1f ms, %5.1f times %s\n", shadow_scenes[i].name,
+                       ways[w].name, model ? "model" : "plane", f->percent[i][w][model], rays,
+                       times > 1 ? times : 1 / times, times > 1 ? "as long" : "less: rays win");
+            }
 }
 
 // A frame of each scene at half its size, two by two; the settings with 4 shells.
@@ -232,7 +332,7 @@ static bool draw_frames(const char *chart_path, alb_error *error)
     for (int i = 0; ok && i < SHADOW_SCENES; i++) {
         alb_scene scene;
         alb_image picture = {0};
-        alb_shadow_stage stage = stage_of(4);
+        alb_shadow_stage stage = stage_of(5); // with transport where a scene has rigid objects
         double brightest, exposure;
         if (!shadow_scenes[i].create(&scene, 12, error))
             break;
@@ -258,27 +358,28 @@ int main(int argc, char **argv)
 {
     alb_error error = {0};
     const int frames = argc > 2 ? atoi(argv[2]) : 20;
-    static double ms[SHADOW_SCENES][WAYS], percent[2][SHADOW_SCENES][WAYS], ray_ms[SHADOW_SCENES][RAYS],
-        ray_percent[SHADOW_SCENES][RAYS];
+    static figures f;
     bool ok = frames >= CHECKED && frames <= 60;
     printf("%-8s %-17s %8s %8s %9s %9s %8s %8s %10s %10s\n", "scene", "", "sampling", "scaling", "products",
-           "frame, ms", "frames/s", "paper", "ground, %", "model, %");
+           "frame, ms", "frames/s", "paper", "plane, %", "model, %");
     for (int i = 0; ok && i < SHADOW_SCENES; i++)
         for (int w = 0; ok && w < WAYS; w++) {
             result r;
             ok = run_way(&r, i, w, frames, &error);
-            ms[i][w] = r.ms;
-            for (int k = 0; k < 2; k++)
-                percent[k][i][w] = r.error_percent[k];
-            printf("%-8s %-17s %8.2f %8.2f %9.2f %9.2f %8.1f %8.1f %10.2f %10.2f\n", shadow_scenes[i].name,
-                   ways[w].name, r.sampling_ms, r.scaling_ms, r.products_ms, r.ms, 1e3 / r.ms,
-                   shadow_scenes[i].paper_fps, r.error_percent[0], r.error_percent[1]);
+            f.ms[i][w] = r.ms;
+            memcpy(f.percent[i][w], r.error_percent, sizeof r.error_percent);
+            if (r.ms > 0)
+                printf("%-8s %-17s %8.2f %8.2f %9.2f %9.2f %8.1f %8.1f %10.2f %10.2f\n", shadow_scenes[i].name,
+                       ways[w].name, r.sampling_ms, r.scaling_ms, r.products_ms, r.ms, 1e3 / r.ms,
+                       shadow_scenes[i].paper_fps, r.error_percent[0], r.error_percent[1]);
             fflush(stdout);
         }
     for (int i = 0; ok && i < SHADOW_SCENES; i++)
-        ok = run_rays(ray_ms[i], ray_percent[i], i, &error);
+        ok = run_rays(f.ray_ms[i], f.ray_percent[i], i, &error);
+    if (ok)
+        compare(&f);
     if (ok && argc > 1)
-        ok = chart(argv[1], ms, percent, ray_ms, ray_percent, &error) && draw_frames(argv[1], &error);
+        ok = chart(argv[1], &f, &error) && draw_frames(argv[1], &error);
     if (!ok)
         fprintf(stderr, "bench.shadow: %s\n", error.status ? error.text : "3 to 60 frames");
     return ok ? 0 : 1;

@@ -17,7 +17,7 @@ static double uniform(alb_random *random, double low, double high)
 
 static void close_object(alb_scene *scene, size_t first, bool receives_only)
 {
-    scene->objects[scene->object_count++] = (alb_object){first, scene->mesh.vertex_count - first, receives_only};
+    scene->objects[scene->object_count++] = (alb_object){first, scene->mesh.vertex_count - first, receives_only, false};
 }
 
 // A ground, one to three balls or blocks above it, an uneven sky and, in half of the scenes, a ball that shines.
@@ -118,15 +118,15 @@ static void keeps_the_error_it_states(void **state)
     for (int number = 0; number < scenes; number++) {
         alb_error error = {0};
         alb_scene scene;
-        double upper;
+        alb_shadow_verdict verdict;
         create(&scene, number);
         alb_shadow_stage stage = {.settings = alb_shadow_defaults};
         const double wanted = number % 3 ? 10 : 5;
-        if (alb_shadow_advise(&stage, &upper, &scene, wanted, (uint64_t)number, &error)) {
+        if (alb_shadow_advise(&stage, &verdict, &scene, wanted, (uint64_t)number, &error)) {
             const double found = true_error(&stage, &scene);
-            kept += found <= upper;
+            kept += found <= verdict.upper_percent;
             within += found <= wanted;
-            steepest = fmax(steepest, found / upper);
+            steepest = fmax(steepest, found / verdict.upper_percent);
         } else {
             assert_int_equal(error.status, ALB_UNDECIDED);
             given_up++;

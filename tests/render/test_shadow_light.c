@@ -127,7 +127,8 @@ static void white_furnace(void **state)
         even_sky(s, finite ? 100 : 0);
         for (int n = 0; n < 300; n++) {
             const alb_vector at = alb_times(98 * alb_random_uniform(&random), direction(&random));
-            check_relative(irradiance(s, at, direction(&random)), M_PI, 2e-6); // float: 16 to 64 sums, two rotations
+            // every step leaves the mean alone: what remains are two roundings of it, and of 63 zeros
+            check_relative(irradiance(s, at, direction(&random)), M_PI, 1e-6);
         }
     }
     alb_error error = {0};
@@ -171,8 +172,7 @@ static void mid_range_environment(void **state)
         mean += (double)truth[0] / POINTS;
     }
     print_message("mid-range, k to 0.5: irradiance within %.4f rms of a mean of %.3f\n", sqrt(sum), mean);
-    // 0.005 of the largest irradiance, pi: the clamped cosine beyond order 4 is what remains
-    check_below(sqrt(sum), 0.005 * M_PI * 1.2);
+    check_below(sqrt(sum), 0.005); // the goal; what is left: the cosine and the cap beyond order 8
     alb_tracer_free(&tracer);
     alb_light_free(&light);
     free_stage(s);
@@ -217,7 +217,7 @@ static void receiver_crosses_the_bounding_sphere(void **state)
     alb_random random = alb_random_at(1, 8, 0);
     for (int inner = 0; inner <= 3; inner += 3) {
         alb_shadow_settings settings = alb_shadow_defaults;
-        settings.inner = inner, settings.outer = inner ? 2 : 1, settings.rays = 128;
+        settings.inner = inner, settings.far = inner > 0, settings.rays = 128;
         stage *s = new_stage(4);
         even_sky(s, 0);
         add_ball(s, 0, (alb_vector){-5, 0, 0}, 3, settings);

@@ -16,6 +16,7 @@
     "{\"shape\":\"box\",\"size_mm\":[200,200,2],\"centre_mm\":[0,0,-1],\"cells\":[20,20,1],\"material\":\"m\","        \
     "\"shadow\":\"receives\"}"
 #define BALL "{\"mesh\":\"test_shadow_#.obj\",\"material\":\"m\"}"
+#define RIGID "{\"mesh\":\"test_shadow_#.obj\",\"material\":\"m\",\"rigid\":true}"
 
 static void write(const char *path, const char *text)
 {
@@ -58,7 +59,7 @@ static void reads_its_keys(void **state)
     alb_scene scene;
     alb_provenance provenance = {0};
     write_frames();
-    write_scene(GROUND "," BALL,
+    write_scene(GROUND "," RIGID,
                 "\"lights\":[{\"kind\":\"environment\",\"radiance\":[1,1,1],\"centre_mm\":[1,2,3],"
                 "\"radius_mm\":500}],",
                 3);
@@ -67,6 +68,7 @@ static void reads_its_keys(void **state)
         assert_int_equal(scene.frames, 3);
         assert_int_equal(scene.object_count, 2);
         assert_true(scene.objects[0].receives_only && !scene.objects[1].receives_only);
+        assert_true(!scene.objects[0].rigid && scene.objects[1].rigid);
         assert_int_equal(scene.objects[1].first_vertex, scene.objects[0].vertex_count);
         assert_int_equal(scene.objects[1].vertex_count, 8);
         check_near(scene.mesh.vertices[scene.objects[1].first_vertex].z, 5 + 20 * frame, 0);
@@ -130,6 +132,8 @@ static void refuses_what_is_wrong(void **state)
          ALB_BAD_DATA},
         {GROUND ",{\"mesh\":\"test_shadow_0.obj\",\"material\":\"m\",\"shadow\":\"no\"}", "", 1, "a.exr", NULL, NULL,
          "shadow", ALB_BAD_DATA},
+        {GROUND ",{\"mesh\":\"test_shadow_0.obj\",\"material\":\"m\",\"rigid\":1}", "", 1, "a.exr", NULL, NULL, "rigid",
+         ALB_BAD_DATA},
         {GROUND, "", 1, "a.exr", "a.ply", NULL, "--mesh", ALB_USAGE},
         {GROUND, "", 1, "a.exr", NULL, "many", "--error", ALB_USAGE},
     };
@@ -173,22 +177,22 @@ static void says_what_error_it_makes(void **state)
     (void)state;
     alb_error error = {0};
     alb_scene scene;
-    double percent, upper;
+    alb_shadow_verdict made;
     check_ok(shadow_scenes[2].create(&scene, 20, &error), &error);
     alb_shadow_stage stage = {.settings = alb_shadow_defaults};
     check_ok(alb_shadow_stage_light(&stage, &scene, &error), &error);
-    check_ok(alb_shadow_error(&percent, &upper, &stage, &scene, 1, &error), &error);
-    assert_true(percent > 0.5 && percent < upper && upper < 20);
+    check_ok(alb_shadow_error(&made, &stage, &scene, 1, &error), &error);
+    assert_true(made.percent > 0.5 && made.percent < made.upper_percent && made.upper_percent < 20);
     // what is spoilt by 30 % everywhere must be said to be so
     for (size_t v = 0; v < scene.mesh.vertex_count; v++)
         for (int c = 0; c < 3; c++)
             stage.irradiance[v][c] *= 1.3F;
-    check_ok(alb_shadow_error(&percent, &upper, &stage, &scene, 1, &error), &error);
-    print_message("spoilt by 30 %%: %.1f, within %.1f\n", percent, upper);
-    assert_true(percent > 25 && upper < 60);
-    check_ok(alb_shadow_advise(&stage, &upper, &scene, 8, 1, &error), &error);
-    assert_true(upper <= 8);
-    check_fails(alb_shadow_advise(&stage, &upper, &scene, 0.01, 1, &error), &error, ALB_UNDECIDED, "radiosity");
+    check_ok(alb_shadow_error(&made, &stage, &scene, 1, &error), &error);
+    print_message("spoilt by 30 %%: %.1f, within %.1f\n", made.percent, made.upper_percent);
+    assert_true(made.percent > 25 && made.upper_percent < 60);
+    check_ok(alb_shadow_advise(&stage, &made, &scene, 8, 1, &error), &error);
+    assert_true(made.upper_percent <= 8);
+    check_fails(alb_shadow_advise(&stage, &made, &scene, 0.01, 1, &error), &error, ALB_UNDECIDED, "radiosity");
     alb_shadow_stage_free(&stage);
     alb_scene_free(&scene);
 }

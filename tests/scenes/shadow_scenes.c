@@ -259,6 +259,8 @@ static bool create_teapot(alb_scene *scene, int frame, alb_error *error)
          add_loft(&scene->mesh, 84, 90, pot_ring, NULL, 1, error) &&
          add_loft(&scene->mesh, 34, 32, spout_ring, NULL, 1, error) &&
          add_loft(&scene->mesh, 44, 30, handle_ring, NULL, 1, error);
+    for (size_t o = 0; ok && o < scene->object_count; o++)
+        scene->objects[o].rigid = true;
     return finish(ok, scene);
 }
 
