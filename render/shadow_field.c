@@ -1,16 +1,14 @@
 // Sampling: from each outer node a flat picture (shadow_view.h) gives the coefficients in the picture's frame, which
-// are turned into the world's; from each inner node rays, even over the sphere (a Fibonacci lattice of N):
-//     S_i = 4 pi / N sum over rays q that meet something of Y_i(d_q)
-// A node is inside the object where more than half of its rays meet a back first; what it would see is the object's
-// inner wall, which hides everything from the receivers around it. It takes the sample of the shell outside it instead,
-// scaled (k < 1) as for a receiver there.
-// Stops being true between nodes where what is seen changes faster than bilinearly: 11 degrees for 8 cells.
+// are turned into the world's; from each inner node rays to all sides (shadow_lattice.h). A node inside the object
+// would see its inner wall, which hides everything from the receivers around it. It takes the sample of the shell
+// outside it instead, scaled (k < 1) as for a receiver there. Stops being true between nodes where what is seen changes
+// faster than bilinearly: 11 degrees for 8 cells.
 #include "render/shadow_field.h"
 #include "base/memory.h"
 #include "render/sh_rotate.h"
 #include "render/sh_scale.h"
+#include "render/shadow_lattice.h"
 #include "render/shadow_shape.h"
-#include "render/tracer.h"
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,8 +17,9 @@ const alb_shadow_settings alb_shadow_defaults = {
     .order = 4, .cells = 8, .pixels = 64, .distance = 1.1, .outer = 1, .rays = 512, .cluster = 0.04};
 const alb_shadow_settings alb_shadow_light_settings = {
     .order = 4, .cells = 8, .pixels = 40, .distance = 1.1, .outer = 6};
-const double alb_shadow_inner_radii[ALB_SHADOW_INNER_MAX] = {0.85, 0.6, 0.4},
-             alb_shadow_outer_ratios[ALB_SHADOW_OUTER_MAX] = {1, 1.4, 2, 3.2, 6, 12};
+// Radii of 1, 2, 3 inner shells from outside inwards; of the outer ones over the first one's; of the far one.
+static const double inner_radii[ALB_SHADOW_INNER_MAX][ALB_SHADOW_INNER_MAX] = {{0.85}, {0.8, 0.55}, {0.88, 0.72, 0.55}},
+                    outer_ratios[ALB_SHADOW_OUTER_MAX] = {1, 1.4, 2, 3.2, 6, 12}, far_radius = 2.9;
 
 typedef struct alb_shadow_work { // of one thread
     alb_shadow_corners corners;
@@ -28,40 +27,42 @@ typedef struct alb_shadow_work { // of one thread
     uint32_t *seen;
 } work;
 
+typedef struct alb_shadow_nodes {
+    size_t count;
+    alb_vector *directions;
+    float *axes;  // [3][nodes]: from each node to the middle
+    float *local; // [channel][value][nodes]: in the pictures' frames
+} nodes;
+
 typedef struct alb_shadow_studio {
     alb_shadow_shape shape;
-    alb_shadow_lens lenses[ALB_SHADOW_OUTER_MAX];
-    alb_vector *vertices; // that the samples are of
+    alb_shadow_lens lenses[ALB_SHADOW_SHELLS_MAX]; // of the shells that are pictures
+    alb_vector *vertices;                          // that the samples are of
     bool sampled;
-    alb_vector *directions; // of the nodes
-    float *axes;            // [3][nodes]: from each node to the middle
-    float *local;           // [channel][value][nodes]: in the pictures' frames
+    nodes near, far; // of all shells but the far one, and of that one
     work *works;
     int work_count;
-    alb_vector *rays; // of inner nodes
-    float *ray_basis; // [ray][value]
+    alb_shadow_lattice rays; // of inner nodes
 } studio;
 
-static size_t count_of(const alb_shadow_field *field)
-{
-    return (size_t)alb_shadow_grid_count((alb_shadow_grid){field->settings.cells});
-}
+static size_t values_of(const alb_shadow_shell *shell) { return (size_t)(shell->order * shell->order); }
 
-static size_t values_of(const alb_shadow_field *field)
+static const nodes *nodes_of(const alb_shadow_field *field, int shell)
 {
-    return (size_t)(field->settings.order * field->settings.order);
+    return field->settings.far && shell == field->shell_count - 1 ? &field->studio->far : &field->studio->near;
 }
 
 static float *sample_at(const alb_shadow_field *field, int shell, size_t node)
 {
-    return field->samples + ((size_t)shell * count_of(field) + node) * (size_t)field->channels * values_of(field);
+    const alb_shadow_shell *of = &field->shells[shell];
+    return field->samples + of->first + node * (size_t)field->channels * values_of(of);
 }
 
 static bool check(const alb_shadow_settings *s, bool shines, const char *name, alb_error *error)
 {
     if (s->order < 2 || s->order > ALB_SH_ORDER_MAX || s->cells < 1 || s->cells > ALB_SHADOW_CELLS_MAX ||
-        s->inner < 0 || s->inner > ALB_SHADOW_INNER_MAX || (s->inner && (s->rays < 16 || s->rays > 65536)) ||
-        !(s->cluster >= 0 && s->cluster <= 0.5))
+        s->outer < 1 || s->outer > ALB_SHADOW_OUTER_MAX || s->inner < 0 || s->inner > ALB_SHADOW_INNER_MAX ||
+        (s->inner && (s->rays < 16 || s->rays > 65536)) || !(s->cluster >= 0 && s->cluster <= 0.5))
         return alb_fail(
             error, ALB_BAD_DATA,
             "%s: a shadow field of order %d with %d cells, %d shells outside, %d inside of %d rays, clusters of %g "
@@ -69,7 +70,11 @@ static bool check(const alb_shadow_settings *s, bool shines, const char *name, a
             "clusters to 0.5 exist",
             name, s->order, s->cells, s->outer, s->inner, s->rays, s->cluster, ALB_SH_ORDER_MAX, ALB_SHADOW_CELLS_MAX,
             ALB_SHADOW_OUTER_MAX, ALB_SHADOW_INNER_MAX);
-    return !(shines && s->inner) || alb_fail(error, ALB_BAD_DATA, "%s: a light's field has no inner shells", name);
+    if (s->far && !(s->distance * outer_ratios[s->outer - 1] < far_radius))
+        return alb_fail(error, ALB_BAD_DATA, "%s: %d shells outside from %g radii on reach the far one at %g", name,
+                        s->outer, s->distance, far_radius);
+    return !(shines && (s->inner || s->far)) ||
+           alb_fail(error, ALB_BAD_DATA, "%s: a light's field has no inner and no far shells", name);
 }
 
 static bool create_works(studio *s, const alb_shadow_settings *settings, alb_error *error)
@@ -92,68 +97,83 @@ static bool create_works(studio *s, const alb_shadow_settings *settings, alb_err
     return true;
 }
 
-static bool create_rays(studio *s, int rays, int order, alb_error *error)
+static bool create_nodes(nodes *out, int cells, size_t per_node, alb_error *error)
 {
-    const size_t values = (size_t)(order * order);
-    double basis[ALB_SH_COUNT_MAX];
-    if (!(s->rays = alb_allocate((size_t)rays, sizeof *s->rays, error)) ||
-        !(s->ray_basis = alb_allocate((size_t)rays * values, sizeof *s->ray_basis, error)))
+    const alb_shadow_grid grid = {cells};
+    const size_t count = out->count = (size_t)alb_shadow_grid_count(grid);
+    if (!(out->directions = alb_allocate(count, sizeof *out->directions, error)) ||
+        !(out->axes = alb_allocate(3 * count, sizeof *out->axes, error)) ||
+        !(out->local = alb_allocate(per_node * count, sizeof *out->local, error)))
         return false;
-    for (int q = 0; q < rays; q++) {
-        const double z = 1 - (2 * q + 1.0) / rays, turn = M_PI * (3 - sqrt(5)) * q, r = sqrt(1 - z * z);
-        s->rays[q] = (alb_vector){r * cos(turn), r * sin(turn), z};
-        alb_sh_evaluate(basis, order, s->rays[q]);
-        for (size_t i = 0; i < values; i++)
-            s->ray_basis[(size_t)q * values + i] = (float)(4 * M_PI / rays * basis[i]);
+    for (size_t n = 0; n < count; n++) {
+        const alb_vector d = out->directions[n] = alb_shadow_grid_direction(grid, (int)n);
+        out->axes[n] = (float)-d.x;
+        out->axes[count + n] = (float)-d.y;
+        out->axes[2 * count + n] = (float)-d.z;
     }
     return true;
 }
 
-static bool create_nodes(studio *s, alb_shadow_grid grid, size_t per_node, alb_error *error)
+static void free_nodes(nodes *n)
 {
-    const size_t nodes = (size_t)alb_shadow_grid_count(grid);
-    if (!(s->directions = alb_allocate(nodes, sizeof *s->directions, error)) ||
-        !(s->axes = alb_allocate(3 * nodes, sizeof *s->axes, error)) ||
-        !(s->local = alb_allocate(per_node * nodes, sizeof *s->local, error)))
-        return false;
-    for (size_t n = 0; n < nodes; n++) {
-        const alb_vector d = s->directions[n] = alb_shadow_grid_direction(grid, (int)n);
-        s->axes[n] = (float)-d.x;
-        s->axes[nodes + n] = (float)-d.y;
-        s->axes[2 * nodes + n] = (float)-d.z;
+    free(n->directions);
+    free(n->axes);
+    free(n->local);
+}
+
+static void place_shells(alb_shadow_field *field)
+{
+    const alb_shadow_settings *s = &field->settings;
+    field->shell_count = s->inner + s->outer + s->far;
+    for (int i = 0; i < field->shell_count; i++) {
+        const int outer = i - s->inner;
+        alb_shadow_shell *shell = &field->shells[i];
+        *shell = (alb_shadow_shell){.order = s->order, .cells = s->cells, .first = field->sample_count};
+        if (outer < 0)
+            shell->radius = inner_radii[s->inner - 1][-1 - outer];
+        else if (outer < s->outer)
+            shell->radius = s->distance * outer_ratios[outer];
+        else
+            *shell = (alb_shadow_shell){far_radius, ALB_SHADOW_FAR_ORDER, ALB_SHADOW_FAR_CELLS, field->sample_count};
+        field->sample_count +=
+            (size_t)alb_shadow_grid_count((alb_shadow_grid){shell->cells}) * (size_t)field->channels * values_of(shell);
     }
-    return true;
+}
+
+static bool create_studio(alb_shadow_field *field, const alb_mesh *mesh, const float (*face_radiance)[3],
+                          const char *name, alb_error *error)
+{
+    studio *s = field->studio;
+    const alb_shadow_settings *settings = &field->settings;
+    const size_t near_values = (size_t)(field->channels * settings->order * settings->order),
+                 far_values = (size_t)(field->channels * ALB_SHADOW_FAR_ORDER * ALB_SHADOW_FAR_ORDER);
+    for (int i = settings->inner; i < field->shell_count; i++)
+        if (!alb_shadow_lens_create(&s->lenses[i], settings->pixels, field->shells[i].order, field->shells[i].radius,
+                                    error))
+            return false;
+    return (s->vertices = alb_allocate(mesh->vertex_count, sizeof *s->vertices, error)) &&
+           alb_shadow_shape_create(&s->shape, mesh, face_radiance, settings->cluster * field->sphere.radius_mm, name,
+                                   error) &&
+           create_nodes(&s->near, settings->cells, near_values, error) &&
+           (!settings->far || create_nodes(&s->far, ALB_SHADOW_FAR_CELLS, far_values, error)) &&
+           create_works(s, settings, error) &&
+           (!settings->inner || alb_shadow_lattice_create(&s->rays, settings->rays, settings->order, error));
 }
 
 bool alb_shadow_field_create(alb_shadow_field *field, const alb_shadow_settings *settings, const alb_mesh *mesh,
                              const float (*face_radiance)[3], const char *name, alb_error *error)
 {
-    const int inner = settings->inner;
     *field = (alb_shadow_field){.settings = *settings, .channels = face_radiance ? 3 : 1};
     if (!check(settings, face_radiance, name, error) ||
         !alb_shadow_sphere_follow(&field->sphere, mesh->vertices, mesh->vertex_count, name, error) ||
         !(field->studio = alb_allocate(1, sizeof *field->studio, error)))
         return false;
-    studio *s = field->studio;
-    field->shells = inner + settings->outer;
-    for (int i = 0; i < inner; i++)
-        field->radii[i] = alb_shadow_inner_radii[inner - 1 - i];
-    const size_t per_node = (size_t)field->channels * values_of(field);
-    field->samples = alb_allocate((size_t)field->shells * count_of(field) * per_node, sizeof *field->samples, error);
-    s->vertices = alb_allocate(mesh->vertex_count, sizeof *s->vertices, error);
-    bool ok = field->samples && s->vertices;
-    for (int i = 0; ok && i < settings->outer; i++) {
-        const double radius = field->radii[inner + i] = settings->distance * alb_shadow_outer_ratios[i];
-        ok = alb_shadow_lens_create(&s->lenses[i], settings->pixels, settings->order, radius, error);
-    }
-    ok = ok &&
-         alb_shadow_shape_create(&s->shape, mesh, face_radiance, settings->cluster * field->sphere.radius_mm, name,
-                                 error) &&
-         create_nodes(s, (alb_shadow_grid){settings->cells}, per_node, error) && create_works(s, settings, error) &&
-         (!inner || create_rays(s, settings->rays, settings->order, error));
-    if (!ok)
-        alb_shadow_field_free(field);
-    return ok;
+    place_shells(field);
+    if ((field->samples = alb_allocate(field->sample_count, sizeof *field->samples, error)) &&
+        create_studio(field, mesh, face_radiance, name, error))
+        return true;
+    alb_shadow_field_free(field);
+    return false;
 }
 
 void alb_shadow_field_free(alb_shadow_field *field)
@@ -168,35 +188,29 @@ void alb_shadow_field_free(alb_shadow_field *field)
             free(s->works[t].seen);
         }
         free(s->works);
-        for (int i = 0; i < ALB_SHADOW_OUTER_MAX; i++)
+        for (int i = 0; i < ALB_SHADOW_SHELLS_MAX; i++)
             alb_shadow_lens_free(&s->lenses[i]);
         alb_shadow_shape_free(&s->shape);
         free(s->vertices);
-        free(s->directions);
-        free(s->axes);
-        free(s->local);
-        free(s->rays);
-        free(s->ray_basis);
+        free_nodes(&s->near);
+        free_nodes(&s->far);
+        alb_shadow_lattice_free(&s->rays);
         free(s);
     }
     free(field->samples);
     *field = (alb_shadow_field){0};
 }
 
-size_t alb_shadow_field_bytes(const alb_shadow_field *field)
-{
-    return (size_t)field->shells * count_of(field) * (size_t)field->channels * values_of(field) * sizeof(float);
-}
+size_t alb_shadow_field_bytes(const alb_shadow_field *field) { return field->sample_count * sizeof(float); }
 
 // The picture from node n of a shell outside, as column n of local.
-static void take_picture(const alb_shadow_field *field, const alb_shadow_lens *lens, size_t n)
+static void take_picture(const alb_shadow_field *field, const alb_shadow_lens *lens, const nodes *of, size_t n)
 {
     const studio *s = field->studio;
-    const size_t values = values_of(field), nodes = count_of(field);
     work *w = &s->works[omp_get_thread_num()];
     float out[3 * ALB_SH_COUNT_MAX];
     double world_from_picture[3][3];
-    alb_sh_axis_rotation(world_from_picture, alb_times(-1, s->directions[n]));
+    alb_sh_axis_rotation(world_from_picture, alb_times(-1, of->directions[n]));
     alb_shadow_project(&w->corners, s->shape.x, s->shape.y, s->shape.z, (const double(*)[3])world_from_picture, lens);
     if (s->shape.face_colours)
         alb_shadow_view_radiance(out, &w->corners, (const uint32_t(*)[3])s->shape.drawn, s->shape.drawn_count,
@@ -204,23 +218,24 @@ static void take_picture(const alb_shadow_field *field, const alb_shadow_lens *l
     else
         alb_shadow_view_occlusion(out, &w->corners, (const uint32_t(*)[3])s->shape.drawn, s->shape.drawn_count,
                                   s->shape.closed, lens);
-    for (size_t i = 0; i < (size_t)field->channels * values; i++)
-        s->local[i * nodes + n] = out[i];
+    for (size_t i = 0; i < (size_t)(field->channels * lens->values); i++)
+        of->local[i * of->count + n] = out[i];
 }
 
-static void sample_outside(const alb_shadow_field *field, int outer)
+static void sample_outside(const alb_shadow_field *field, int shell)
 {
     const studio *s = field->studio;
-    const size_t values = values_of(field), nodes = count_of(field), channels = (size_t)field->channels;
+    const nodes *of = nodes_of(field, shell);
+    const size_t values = values_of(&field->shells[shell]), count = of->count;
 #pragma omp parallel for schedule(dynamic, 8) num_threads(s->work_count)
-    for (size_t n = 0; n < nodes; n++)
-        take_picture(field, &s->lenses[outer], n);
-    for (size_t c = 0; c < channels; c++) {
-        float *local = s->local + c * values * nodes;
-        alb_sh_from_axis_batch(local, local, field->settings.order, s->axes, nodes, nodes);
-        for (size_t n = 0; n < nodes; n++)
+    for (size_t n = 0; n < count; n++)
+        take_picture(field, &s->lenses[shell], of, n);
+    for (size_t c = 0; c < (size_t)field->channels; c++) {
+        float *local = of->local + c * values * count;
+        alb_sh_from_axis_batch(local, local, field->shells[shell].order, of->axes, count, count);
+        for (size_t n = 0; n < count; n++)
             for (size_t i = 0; i < values; i++)
-                sample_at(field, field->settings.inner + outer, n)[c * values + i] = local[i * nodes + n];
+                sample_at(field, shell, n)[c * values + i] = local[i * count + n];
     }
 }
 
@@ -228,37 +243,17 @@ static void sample_outside(const alb_shadow_field *field, int outer)
 static void replace(float *out, const alb_shadow_field *field, int shell, size_t n, const alb_sh_scaling *scaling)
 {
     const int order = field->settings.order;
-    const size_t values = values_of(field);
-    const float *from = sample_at(field, shell + 1, n);
-    double world_from_axis[3][3], axis_from_world[3][3], sample[ALB_SH_COUNT_MAX], scaled[ALB_SH_COUNT_MAX];
-    alb_sh_axis_rotation(world_from_axis, alb_times(-1, field->studio->directions[n]));
-    for (int i = 0; i < 9; i++)
-        axis_from_world[i % 3][i / 3] = world_from_axis[i / 3][i % 3];
+    const size_t values = (size_t)(order * order), count = field->studio->near.count;
+    const float *axes = field->studio->near.axes, axis[3] = {axes[n], axes[count + n], axes[2 * count + n]};
+    float turned[ALB_SH_COUNT_MAX];
+    double sample[ALB_SH_COUNT_MAX], scaled[ALB_SH_COUNT_MAX];
+    alb_sh_to_axis_batch(turned, sample_at(field, shell + 1, n), order, axis, 1, 1);
     for (size_t i = 0; i < values; i++)
-        sample[i] = (double)from[i];
-    alb_sh_rotate(sample, sample, order, (const double(*)[3])axis_from_world);
+        sample[i] = (double)turned[i];
     alb_sh_scaling_apply(scaled, scaling, sample);
-    alb_sh_rotate(scaled, scaled, order, (const double(*)[3])world_from_axis);
     for (size_t i = 0; i < values; i++)
-        out[i] = (float)scaled[i];
-}
-
-// Whether the node is outside the object, and then its sample.
-static bool look_around(float *out, const alb_shadow_field *field, const alb_tracer *tracer, alb_vector at)
-{
-    const studio *s = field->studio;
-    const size_t values = values_of(field);
-    int backs = 0;
-    memset(out, 0, values * sizeof *out);
-    for (int q = 0; q < field->settings.rays; q++) {
-        alb_hit hit;
-        if (!alb_tracer_closest(&hit, tracer, at, s->rays[q]))
-            continue;
-        backs += !hit.front;
-        for (size_t i = 0; i < values; i++)
-            out[i] += s->ray_basis[(size_t)q * values + i];
-    }
-    return 2 * backs <= field->settings.rays;
+        turned[i] = (float)scaled[i];
+    alb_sh_from_axis_batch(out, turned, order, axis, 1, 1);
 }
 
 static bool sample_inside(alb_shadow_field *field, const alb_vector *vertices, alb_error *error)
@@ -274,13 +269,13 @@ static bool sample_inside(alb_shadow_field *field, const alb_vector *vertices, a
     bool ok = alb_tracer_create(&tracer, &mesh, error);
     for (int shell = field->settings.inner - 1; ok && shell >= 0; shell--) {
         alb_sh_scaling scaling;
-        ok = alb_sh_law_at(&scaling, &law, field->radii[shell] / field->radii[shell + 1], error);
+        ok = alb_sh_law_at(&scaling, &law, field->shells[shell].radius / field->shells[shell + 1].radius, error);
 #pragma omp parallel for schedule(dynamic, 8) reduction(+ : replaced)
-        for (size_t n = 0; n < (ok ? count_of(field) : 0); n++) {
-            const double away_mm = field->radii[shell] * field->sphere.radius_mm;
-            const alb_vector at = alb_add(field->sphere.centre_mm, alb_times(away_mm, s->directions[n]));
+        for (size_t n = 0; n < (ok ? s->near.count : 0); n++) {
+            const double away_mm = field->shells[shell].radius * field->sphere.radius_mm;
+            const alb_vector at = alb_add(field->sphere.centre_mm, alb_times(away_mm, s->near.directions[n]));
             float *out = sample_at(field, shell, n);
-            if (!look_around(out, field, &tracer, at)) {
+            if (!alb_shadow_lattice_look(out, &s->rays, &tracer, at)) {
                 replace(out, field, shell, n, &scaling);
                 replaced++;
             }
@@ -301,16 +296,16 @@ bool alb_shadow_field_sample(alb_shadow_field *field, const alb_vector *vertices
         return true;
     memcpy(s->vertices, vertices, bytes);
     alb_shadow_shape_place(&s->shape, vertices, &field->sphere);
-    for (int outer = 0; outer < field->settings.outer; outer++)
-        sample_outside(field, outer);
+    for (int shell = field->settings.inner; shell < field->shell_count; shell++)
+        sample_outside(field, shell);
     s->sampled = field->settings.inner == 0 || sample_inside(field, vertices, error);
     return s->sampled;
 }
 
 void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction)
 {
-    const alb_shadow_place place = alb_shadow_grid_place((alb_shadow_grid){field->settings.cells}, direction);
-    const size_t values = (size_t)field->channels * values_of(field);
+    const alb_shadow_place place = alb_shadow_grid_place((alb_shadow_grid){field->shells[shell].cells}, direction);
+    const size_t values = (size_t)field->channels * values_of(&field->shells[shell]);
     const float *from[4];
     for (int k = 0; k < 4; k++)
         from[k] = sample_at(field, shell, (size_t)place.nodes[k]);

@@ -9,7 +9,13 @@
 #include "render/shadow_sphere.h"
 #include "render/shadow_view.h"
 
-enum { ALB_SHADOW_INNER_MAX = 3, ALB_SHADOW_OUTER_MAX = 6 };
+enum {
+    ALB_SHADOW_INNER_MAX = 3,
+    ALB_SHADOW_OUTER_MAX = 6,
+    ALB_SHADOW_SHELLS_MAX = ALB_SHADOW_INNER_MAX + ALB_SHADOW_OUTER_MAX + 1,
+    ALB_SHADOW_FAR_ORDER = 6, // of the far shell and its grid: far away an object is small, finer bands of it matter
+    ALB_SHADOW_FAR_CELLS = 5  // more than nodes do; together as many numbers as order 4 with 8 cells
+};
 
 typedef struct alb_shadow_settings {
     int order;       // of the samples, 2 to ALB_SH_ORDER_MAX; receivers get order 4
@@ -18,23 +24,28 @@ typedef struct alb_shadow_settings {
     double distance; // of the first shell outside from the middle, in radii of the bounding sphere
     int outer;       // shells outside, 1 to ALB_SHADOW_OUTER_MAX
     int inner;       // shells inside, 0 to ALB_SHADOW_INNER_MAX; occlusion only
+    bool far;        // one more at 2.9 radii, beyond the others, of ALB_SHADOW_FAR_ORDER; occlusion only
     int rays;        // from each inner node
     double cluster;  // vertices within about so many radii move as one in pictures from outside; 0: each for itself
 } alb_shadow_settings;
-// Order 4, 8 cells, 64 pixels, one shell at 1.1 radii, none inside, 512 rays, 0.04.
+// Order 4, 8 cells, 64 pixels, one shell at 1.1 radii, none inside or far, 512 rays, 0.04.
 extern const alb_shadow_settings alb_shadow_defaults;
-// The same with three shells: what a light shows of itself changes with the distance more than a silhouette does.
+// Six shells and 40 pixels: what a light shows of itself changes with the distance more than a silhouette does.
 extern const alb_shadow_settings alb_shadow_light_settings;
-// Radii of the inner shells, from outside inwards; those of the outer ones over the first one's.
-extern const double alb_shadow_inner_radii[ALB_SHADOW_INNER_MAX], alb_shadow_outer_ratios[ALB_SHADOW_OUTER_MAX];
+typedef struct alb_shadow_shell {
+    double radius; // in radii of the bounding sphere
+    int order, cells;
+    size_t first; // of its samples among all
+} alb_shadow_shell;
 
 typedef struct alb_shadow_field {
     alb_shadow_settings settings;
     alb_shadow_sphere sphere;
-    int channels;                                              // 1: occlusion, 3: radiance
-    int shells;                                                // inner + outer
-    double radii[ALB_SHADOW_INNER_MAX + ALB_SHADOW_OUTER_MAX]; // in radii of the sphere, ascending
-    float *samples;                                            // [shell][node][channel][order^2]
+    int channels;                                   // 1: occlusion, 3: radiance
+    int shell_count;                                // inner + outer + far
+    alb_shadow_shell shells[ALB_SHADOW_SHELLS_MAX]; // by radius, ascending
+    float *samples;                                 // [shell][node][channel][order^2]
+    size_t sample_count;                            // floats
     size_t replaced; // inner nodes that lie inside the object: they hold what the shell outside them gives, scaled
     struct alb_shadow_studio *studio; // what pictures are taken with
 } alb_shadow_field;
@@ -49,5 +60,6 @@ void alb_shadow_field_free(alb_shadow_field *field);
 bool alb_shadow_field_sample(alb_shadow_field *field, const alb_vector *vertices, alb_error *error);
 size_t alb_shadow_field_bytes(const alb_shadow_field *field);
 
-// The samples of a shell interpolated at a direction from the middle: out[channel][order^2].
+// The samples of a shell interpolated at a direction from the middle: out[channel][order^2], order
+// that of the shell.
 void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction);

@@ -1,18 +1,20 @@
 #include "render/shadow_laws.h"
+#include "render/shadow_field.h"
 
-enum { CELLS = 256, LAWS = 4 };
+enum { CELLS = 256, LAWS = 5 };
 
 bool alb_shadow_laws_create(alb_shadow_laws *laws, int order, bool paper, alb_error *error)
 {
-    const alb_sh_law_kind far = paper ? ALB_SH_LAW_VISIBILITY : ALB_SH_LAW_OCCLUSION;
+    const alb_sh_law_kind outside = paper ? ALB_SH_LAW_VISIBILITY : ALB_SH_LAW_OCCLUSION;
     const alb_sh_law kinds[LAWS] = {
-        {far, ALB_SH_MAP_CONE, 45, ALB_SHADOW_ORDER, order},
+        {outside, ALB_SH_MAP_CONE, 45, ALB_SHADOW_ORDER, order},
+        {outside, ALB_SH_MAP_CONE, 45, ALB_SHADOW_ORDER, ALB_SHADOW_FAR_ORDER},
         {ALB_SH_LAW_VISIBILITY, ALB_SH_MAP_CONE, 45, ALB_SHADOW_ORDER, order},
         {ALB_SH_LAW_LIGHT, ALB_SH_MAP_CONE, 45, ALB_SHADOW_ORDER, ALB_SHADOW_ORDER},
         {ALB_SH_LAW_VISIBILITY, ALB_SH_MAP_MIDRANGE, 45, ALB_SH_ORDER_MAX, ALB_SH_ORDER_MAX},
     };
     *laws = (alb_shadow_laws){0};
-    alb_sh_batch *const batches[LAWS] = {&laws->outer, &laws->inner, &laws->light, &laws->sky};
+    alb_sh_batch *const batches[LAWS] = {&laws->outer, &laws->far, &laws->inner, &laws->light, &laws->sky};
     alb_error errors[LAWS] = {{0}};
 #pragma omp parallel for schedule(dynamic, 1)
     for (int i = 0; i < LAWS; i++)
@@ -28,6 +30,7 @@ bool alb_shadow_laws_create(alb_shadow_laws *laws, int order, bool paper, alb_er
 void alb_shadow_laws_free(alb_shadow_laws *laws)
 {
     alb_sh_batch_free(&laws->outer);
+    alb_sh_batch_free(&laws->far);
     alb_sh_batch_free(&laws->inner);
     alb_sh_batch_free(&laws->light);
     alb_sh_batch_free(&laws->sky);

@@ -25,8 +25,8 @@ void alb_shadow_receivers_at(alb_shadow_receivers *receivers, const alb_shadow_f
 
 bool alb_shadow_receivers_weigh(alb_shadow_receivers *receivers, const alb_shadow_field *field, int shell)
 {
-    const double here = field->radii[shell], inner = shell > 0 ? field->radii[shell - 1] : 0;
-    const double outer = shell + 1 < field->shells ? field->radii[shell + 1] : 0;
+    const double here = field->shells[shell].radius, inner = shell > 0 ? field->shells[shell - 1].radius : 0;
+    const double outer = shell + 1 < field->shell_count ? field->shells[shell + 1].radius : 0;
     bool any = false;
     for (size_t r = 0; r < receivers->count; r++) {
         const double x = receivers->distances_mm[r] / field->sphere.radius_mm;
@@ -51,7 +51,8 @@ bool alb_shadow_receivers_weigh(alb_shadow_receivers *receivers, const alb_shado
 static void add_scaled(float *out, const alb_shadow_receivers *receivers, const alb_shadow_field *field, int shell,
                        const alb_sh_batch *law)
 {
-    const size_t values = (size_t)(field->settings.order * field->settings.order), count = receivers->count;
+    const int order = field->shells[shell].order;
+    const size_t values = (size_t)(order * order), count = receivers->count;
     float samples[ALB_SH_COUNT_MAX * BLOCK], scaled[VALUES * BLOCK], one[ALB_SH_COUNT_MAX];
     memset(samples, 0, values * BLOCK * sizeof *samples);
     for (size_t r = 0; r < count; r++) {
@@ -59,7 +60,7 @@ static void add_scaled(float *out, const alb_shadow_receivers *receivers, const 
         for (size_t i = 0; i < values; i++)
             samples[i * BLOCK + r] = one[i];
     }
-    alb_sh_to_axis_batch(samples, samples, field->settings.order, receivers->axes, BLOCK, count);
+    alb_sh_to_axis_batch(samples, samples, order, receivers->axes, BLOCK, count);
     alb_sh_batch_apply(scaled, law, false, receivers->k, samples, BLOCK, count);
     for (size_t i = 0; i < VALUES; i++)
         for (size_t r = 0; r < count; r++)
@@ -70,8 +71,12 @@ void alb_shadow_receivers_occlusion(float *out, alb_shadow_receivers *receivers,
                                     const alb_shadow_laws *laws)
 {
     memset(out, 0, VALUES * BLOCK * sizeof *out);
-    for (int shell = 0; shell < field->shells; shell++)
+    const int inner = field->settings.inner, far = field->settings.far ? field->shell_count - 1 : field->shell_count;
+    for (int shell = 0; shell < field->shell_count; shell++)
         if (alb_shadow_receivers_weigh(receivers, field, shell))
-            add_scaled(out, receivers, field, shell, shell < field->settings.inner ? &laws->inner : &laws->outer);
+            add_scaled(out, receivers, field, shell,
+                       shell < inner ? &laws->inner
+                       : shell < far ? &laws->outer
+                                     : &laws->far);
     alb_sh_from_axis_batch(out, out, ALB_SHADOW_ORDER, receivers->axes, BLOCK, receivers->count);
 }

@@ -31,9 +31,10 @@ static const struct {
                 {"regressed", false, true, false, 4, 1, 0, 8, 64, 0.04},
                 {"order 8 to 4", false, false, false, 8, 1, 0, 8, 64, 0.04},
                 {"2 shells", false, false, false, 4, 2, 0, 8, 64, 0.04},
-                {"4 shells", false, false, false, 4, 2, 2, 8, 64, 0.04},
-                {"4 shells, order 8", false, false, false, 8, 2, 2, 12, 64, 0.02},
+                {"4 shells", false, false, false, 4, 1, 2, 8, 64, 0.04},
+                {"4 shells, order 8", false, false, false, 8, 1, 2, 12, 64, 0.02},
                 {"transport", false, false, true, 4, 1, 0, 8, 64, 0.04}};
+#define BOTTOM 0.3 // percent, of the chart
 static const int strata[RAYS] = {4, 8, 16, 32};
 
 typedef struct result {
@@ -70,6 +71,7 @@ static alb_shadow_stage stage_of(int way)
     stage.settings.order = ways[way].order;
     stage.settings.outer = ways[way].outer;
     stage.settings.inner = ways[way].inner;
+    stage.settings.far = ways[way].inner > 0;
     stage.settings.cells = ways[way].cells;
     stage.settings.pixels = ways[way].pixels;
     stage.settings.cluster = ways[way].cluster;
@@ -245,7 +247,7 @@ static double ray_time(const double *ms, const double *percent, double wanted)
 static void shade(double *x, double *y, const double *ms, const double *percent, double top)
 {
     for (int n = 0; n < SHADE; n++) {
-        y[2 * n] = percent[0] * pow(percent[RAYS - 1] / percent[0], (double)n / (SHADE - 1));
+        y[2 * n] = percent[0] * pow(BOTTOM / percent[0], (double)n / (SHADE - 1));
         x[2 * n] = x[2 * n + 1] = ray_time(ms, percent, y[2 * n]);
         y[2 * n + 1] = top;
         if (n % 2) {
@@ -298,7 +300,7 @@ static bool chart(const char *path, const figures *f, alb_error *error)
                                 .y_label = "error, % of mean",
                                 .log_x = true,
                                 .log_y = true,
-                                .y_minimum = 0.3,
+                                .y_minimum = BOTTOM,
                                 .y_maximum = 100,
                                 .curves = curves[i],
                                 .curve_count = WAYS + 3,

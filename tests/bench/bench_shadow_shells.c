@@ -13,20 +13,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WAYS = 7, PLACES = 15, RECEIVERS = 40, RAYS = 8192, FULL = 16, FULL_RAYS = 512, RANGES = 4 };
+enum { WAYS = 8, PLACES = 15, RECEIVERS = 40, RAYS = 8192, FULL = 16, FULL_RAYS = 512, RANGES = 4 };
 static const double places[PLACES] = {.4, .5, .6, .7, .8, .9, 1, 1.15, 1.3, 1.6, 2, 2.7, 4, 5.5, 8};
 static const double range_ends[RANGES][2] = {{.5, .9}, {1, 2}, {2.7, 8}, {.4, 8}};
 static const struct {
     const char *name;
     bool paper;
     int order, outer, inner;
-} ways[WAYS] = {{"1 shell, as printed", true, 4, 1, 0},
-                {"1 shell", false, 4, 1, 0},
-                {"2 shells", false, 4, 1, 1},
-                {"4 shells", false, 4, 2, 2},
-                {"4 shells, order 8", false, 8, 2, 2},
-                {"16 shells, uniform", false, 4, 0, 0},
-                {"left out", false, 4, 0, 0}};
+    bool far;
+} ways[WAYS] = {{"1 shell, as printed", true, 4, 1, 0, false},
+                {"1 shell", false, 4, 1, 0, false},
+                {"2 shells", false, 4, 1, 1, false},
+                {"4 shells, near", false, 4, 2, 2, false},
+                {"4 shells", false, 4, 1, 2, true},
+                {"5 shells", false, 4, 1, 3, true},
+                {"16 shells, uniform", false, 4, 0, 0, false},
+                {"left out", false, 4, 0, 0, false}};
 
 typedef struct object {
     alb_mesh mesh;
@@ -123,6 +125,7 @@ static bool measure(object *o, int way, alb_error *error)
     alb_shadow_laws laws = {0};
     bool ok = true;
     settings.order = ways[way].order, settings.outer = ways[way].outer, settings.inner = ways[way].inner;
+    settings.far = ways[way].far;
     if (settings.outer)
         ok = alb_shadow_laws_create(&laws, settings.order, ways[way].paper, error) &&
              alb_shadow_field_create(&field, &settings, &o->mesh, NULL, "model", error) &&
@@ -141,7 +144,7 @@ static bool measure(object *o, int way, alb_error *error)
             float one[16];
             for (int i = 0; i < 16; i++)
                 one[i] = found[i * ALB_SHADOW_BLOCK + r];
-            if (way == 5)
+            if (way == WAYS - 2)
                 look_up_full(one, o, places[p], alb_sub(o->points[p][r], o->sphere.centre_mm));
             count += !o->buried[p][r];
             for (int i = 0; i < 16 && !o->buried[p][r]; i++)

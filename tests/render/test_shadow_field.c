@@ -127,7 +127,8 @@ static void pictures_of_spheres_are_caps(void **state)
                     const alb_vector d = alb_shadow_grid_direction((alb_shadow_grid){8}, n);
                     alb_shadow_field_at(sample, &field, shell, d);
                     // half a pixel of the circumference, of random sign along it; the sphere's facets are smaller
-                    check_below(cap_error(sample, order, alb_times(-1, d), asin(1 / field.radii[shell])), 0.3 / pixels);
+                    check_below(cap_error(sample, order, alb_times(-1, d), asin(1 / field.shells[shell].radius)),
+                                0.3 / pixels);
                 }
             // between nodes the sample changes within 11 degrees as a cap's does: second order of the half cell
             float sample[ALB_SH_COUNT_MAX];
@@ -165,12 +166,49 @@ static void lights_shine_to_the_front(void **state)
             if (inward)
                 check_near((double)sample[16 * c], 0, 1e-6);
             else
-                check_below(cap_error(sample + 16 * c, 4, alb_times(-1, d), asin(1 / field.radii[1])), 0.3 / 64);
+                check_below(cap_error(sample + 16 * c, 4, alb_times(-1, d), asin(1 / field.shells[1].radius)),
+                            0.3 / 64);
         }
         alb_shadow_field_free(&field);
         free(radiance);
         alb_mesh_free(&mesh);
     }
+}
+
+// A ball from the far shell is a cap of order 6, its samples fewer but of more bands; settings that leave no room for
+// it are refused, as are lights that ask for it.
+static void far_shell_sees_caps(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_mesh mesh = {0};
+    sphere(&mesh, (alb_vector){1, 2, 3}, 2, 4);
+    alb_shadow_settings settings = alb_shadow_defaults;
+    settings.inner = 2, settings.far = true;
+    alb_shadow_field field = field_of(&mesh, &settings);
+    assert_int_equal(field.shell_count, 4);
+    assert_int_equal(field.shells[3].order, 6);
+    for (int n = 0; n < alb_shadow_grid_count((alb_shadow_grid){field.shells[3].cells}); n++) {
+        float sample[ALB_SH_COUNT_MAX];
+        const alb_vector d = alb_shadow_grid_direction((alb_shadow_grid){field.shells[3].cells}, n);
+        alb_shadow_field_at(sample, &field, 3, d);
+        check_below(cap_error(sample, 6, alb_times(-1, d), asin(1 / field.shells[3].radius)), 0.1 / settings.pixels);
+    }
+    // a quarter of 16 shells of 386 nodes, order 4
+    assert_true(4 * alb_shadow_field_bytes(&field) < 16 * 386 * 16 * sizeof(float));
+    alb_shadow_field_free(&field);
+    settings.outer = 4;
+    check_fails(alb_shadow_field_create(&field, &settings, &mesh, NULL, "ball", &error), &error, ALB_BAD_DATA, "far");
+    settings.outer = 1, settings.inner = 0;
+    float(*radiance)[3] = calloc(mesh.face_count, sizeof *radiance);
+    error = (alb_error){0};
+    check_fails(alb_shadow_field_create(&field, &settings, &mesh, (const float(*)[3])radiance, "lamp", &error), &error,
+                ALB_BAD_DATA, "lamp");
+    settings.far = false, settings.outer = 7;
+    error = (alb_error){0};
+    check_fails(alb_shadow_field_create(&field, &settings, &mesh, NULL, "ball", &error), &error, ALB_BAD_DATA, "7");
+    free(radiance);
+    alb_mesh_free(&mesh);
 }
 
 // F10: the surface touches the bounding sphere everywhere. From 1.1 radii the cap has 65 degrees, on the surface it
@@ -231,7 +269,7 @@ static void sample_inside_the_object(void **state)
         for (int n = 0; n < 386; n++) {
             float sample[16];
             const alb_vector d = alb_shadow_grid_direction((alb_shadow_grid){8}, n),
-                             at = alb_times(field.radii[shell] * field.sphere.radius_mm, d);
+                             at = alb_times(field.shells[shell].radius * field.sphere.radius_mm, d);
             const double left = alb_length(alb_sub(at, (alb_vector){-7, 0, 0})),
                          right = alb_length(alb_sub(at, (alb_vector){7, 0, 0}));
             alb_shadow_field_at(sample, &field, shell, d);
@@ -371,11 +409,17 @@ static void clusters_keep_the_silhouette(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nodes_are_where_they_are_found), cmocka_unit_test(cube_face_seams),
-        cmocka_unit_test(pictures_of_spheres_are_caps),   cmocka_unit_test(lights_shine_to_the_front),
-        cmocka_unit_test(sample_on_the_surface),          cmocka_unit_test(views_reach_far_enough),
-        cmocka_unit_test(sample_inside_the_object),       cmocka_unit_test(degenerate_meshes),
-        cmocka_unit_test(moving_bounding_sphere),         cmocka_unit_test(same_bytes_with_any_threads),
+        cmocka_unit_test(nodes_are_where_they_are_found),
+        cmocka_unit_test(cube_face_seams),
+        cmocka_unit_test(pictures_of_spheres_are_caps),
+        cmocka_unit_test(lights_shine_to_the_front),
+        cmocka_unit_test(far_shell_sees_caps),
+        cmocka_unit_test(sample_on_the_surface),
+        cmocka_unit_test(views_reach_far_enough),
+        cmocka_unit_test(sample_inside_the_object),
+        cmocka_unit_test(degenerate_meshes),
+        cmocka_unit_test(moving_bounding_sphere),
+        cmocka_unit_test(same_bytes_with_any_threads),
         cmocka_unit_test(clusters_keep_the_silhouette),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

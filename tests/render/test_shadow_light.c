@@ -217,7 +217,7 @@ static void receiver_crosses_the_bounding_sphere(void **state)
     alb_random random = alb_random_at(1, 8, 0);
     for (int inner = 0; inner <= 3; inner += 3) {
         alb_shadow_settings settings = alb_shadow_defaults;
-        settings.inner = inner, settings.outer = inner ? 2 : 1, settings.rays = 128;
+        settings.inner = inner, settings.far = inner > 0, settings.rays = 128;
         stage *s = new_stage(4);
         even_sky(s, 0);
         add_ball(s, 0, (alb_vector){-5, 0, 0}, 3, settings);
