@@ -19,4 +19,6 @@ struct alb_form_row {
 
 extern const alb_form_row alb_dipole_row, alb_better_dipole_row, alb_burley_row, alb_two_over_r_row,
     alb_buried_source_row, alb_two_buried_sources_row, alb_buried_and_over_r_row, alb_multipole_reflection_row,
-    alb_multipole_transmission_row;
+    alb_multipole_transmission_row, alb_tabulated_row;
+
+double alb_tabulated_fastest(const alb_profile *profile);

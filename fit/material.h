@@ -22,7 +22,8 @@ typedef enum alb_form {
     ALB_FORM_BETTER_DIPOLE,        // of a half-space (d'Eon 2012), as diffusion.h
     ALB_FORM_MULTIPOLE_REFLECTION, // of a slab (Donner & Jensen 2005), as diffusion.h
     ALB_FORM_MULTIPOLE_TRANSMISSION,
-    ALB_FORMS
+    ALB_FORMS,                     // those above have parameters and a place in material.json
+    ALB_FORM_TABULATED = ALB_FORMS // exponential from line to line of a table (tabulated.c)
 } alb_form;
 
 // Parameters, in order: of sums of exponentials a1, b1, a2, b2, a3, b3 (amplitude_1_per_mm2, decay_1_per_mm, ...), over
@@ -47,6 +48,13 @@ double alb_profile_total(const alb_profile *profile);
 double alb_profile_disc(const alb_profile *profile, double rho_mm);
 // Mean of S over the ring between two distances, 1/mm^2; outer > inner >= 0.
 double alb_profile_ring(const alb_profile *profile, double inner_mm, double outer_mm);
+
+// From a CSV file as `fit --table` takes it: at least two lines, no value negative, falling where it ends unless it
+// ends with 0; at most a tenth of the total may lie before the first line and beyond the last, and the total is less
+// than 1. ALB_BAD_DATA names the file and the line. Free with alb_profile_free; copies share the table.
+bool alb_profile_read_table(alb_profile *profile, const char *path, alb_error *error);
+// Frees what a tabulated profile holds; of other forms there is nothing to free.
+void alb_profile_free(alb_profile *profile);
 
 // The largest decay of its terms, 1/mm.
 double alb_profile_fastest(const alb_profile *profile);

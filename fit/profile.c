@@ -4,7 +4,7 @@
 //   integral_0^rho S r dr = sum_j a_j (1 - (1 + b_j rho) e^(-b_j rho)) / b_j^2,  total = 2 pi sum_j a_j / b_j^2.
 //   Positive terms are log-convex with a cusp at r = 0. With one negative amplitude, b1 < b2 and a1 + a2 >= 0, S
 //   stays positive (the negative term starts lower and dies first) and can be flat at r = 0, as transmission is.
-// The other rows: buried.c, dipole.c (diffusion.c).
+// The other rows: buried.c, dipole.c (diffusion.c), tabulated.c.
 #include "fit/form.h"
 #include <math.h>
 #include <string.h>
@@ -105,7 +105,7 @@ static const alb_form_row three_exponentials = {.name = "three_exponentials",
                                                 EXPONENTIALS,
                                                 .sound = positive_sound};
 
-static const alb_form_row *const rows[ALB_FORMS] = {
+static const alb_form_row *const rows[ALB_FORMS + 1] = {
     [ALB_FORM_NONE] = &none,
     [ALB_FORM_EXPONENTIAL] = &exponential,
     [ALB_FORM_TWO_EXPONENTIALS] = &two_exponentials,
@@ -115,6 +115,7 @@ static const alb_form_row *const rows[ALB_FORMS] = {
     [ALB_FORM_BETTER_DIPOLE] = &alb_better_dipole_row,
     [ALB_FORM_MULTIPOLE_REFLECTION] = &alb_multipole_reflection_row,
     [ALB_FORM_MULTIPOLE_TRANSMISSION] = &alb_multipole_transmission_row,
+    [ALB_FORM_TABULATED] = &alb_tabulated_row,
     [ALB_FORM_TWO_OVER_R] = &alb_two_over_r_row,
     [ALB_FORM_BURLEY] = &alb_burley_row,
     [ALB_FORM_BURIED_SOURCE] = &alb_buried_source_row,
@@ -189,6 +190,8 @@ double alb_profile_slowest(const alb_profile *profile)
 
 double alb_profile_fastest(const alb_profile *profile)
 {
+    if (profile->form == ALB_FORM_TABULATED)
+        return alb_tabulated_fastest(profile);
     double fastest = alb_profile_slowest(profile);
     for (int p = 0; p < alb_form_parameter_count(profile->form); p++) {
         const alb_parameter *parameter = alb_form_parameter(profile->form, p);

@@ -85,8 +85,8 @@ static bool try_sheet(alb_optical_paths *paths, double *share, double limit_mm, 
 static size_t bytes_of(const alb_optical_paths *paths)
 {
     const alb_surface_net *net = &paths->solid->net;
-    size_t bytes =
-        net->count * (5 * sizeof(alb_vector) + 4 * sizeof(uint32_t)) + alb_voxels_bytes(&paths->solid->voxels);
+    size_t bytes = net->count * (5 * sizeof(alb_vector) + 4 * sizeof(uint32_t) + 3 * sizeof(alb_door)) +
+                   alb_voxels_bytes(&paths->solid->voxels);
     if (paths->sheet)
         bytes += net->count * (2 * sizeof(uint32_t) + 1 + sizeof(alb_vector) + sizeof(double)) +
                  alb_geodesic_surface_bytes(&paths->sheet->surface);

@@ -34,14 +34,16 @@ static double between(const alb_bends *path, int first, int last)
 static bool pull(alb_bends *path, const alb_optical_solid *solid, int first, int last, bool turn)
 {
     alb_bends section;
-    const alb_vector from = path->at[first], to = path->at[last], along = alb_unit(alb_sub(to, from));
+    const alb_chord chord = alb_chord_between(solid, path->at[first], path->at[last]);
+    const double so_far = between(path, first, last);
     alb_vector towards = {0};
     for (int i = first + 1; i < last; i++) {
-        const alb_vector at = alb_sub(path->at[i], from);
-        towards = alb_add(towards, alb_sub(at, alb_times(alb_dot(at, along), along)));
+        const alb_vector at = alb_sub(path->at[i], chord.from);
+        towards = alb_add(towards, alb_sub(at, alb_times(alb_dot(at, chord.along), chord.along)));
     }
-    if (!(turn ? alb_slice_best : alb_slice)(&section, solid, from, to, towards) ||
-        !(section.length_mm < between(path, first, last)))
+    if (!(turn ? alb_slice_best(&section, solid, &chord, towards)
+               : alb_slice(&section, solid, &chord, towards, so_far)) ||
+        !(section.length_mm < so_far))
         return false;
     const int more = section.count - (last - first + 1); // corners
     if (path->count + more > ALB_BENDS_MAX)
@@ -72,13 +74,16 @@ static double length_of(const alb_bends *path, const alb_optical_solid *solid)
     double length = 0;
     for (int i = 1; i < path->count; i++) {
         const alb_vector a = path->at[i - 1], b = path->at[i];
-        alb_bends section;
-        alb_vector towards;
-        section.length_mm = alb_length(alb_sub(b, a));
-        if (!alb_voxels_inside(&solid->voxels, a, b) && alb_slice_direction(&towards, solid, a, b) &&
-            !alb_slice(&section, solid, a, b, towards))
-            section.length_mm = alb_length(alb_sub(b, a));
-        length += section.length_mm;
+        double leg = alb_length(alb_sub(b, a));
+        if (!alb_voxels_inside(&solid->voxels, a, b)) {
+            const alb_chord chord = alb_chord_between(solid, a, b);
+            alb_bends section;
+            alb_vector towards;
+            if (alb_slice_direction(&towards, solid, &chord) &&
+                alb_slice(&section, solid, &chord, towards, (double)INFINITY))
+                leg = section.length_mm;
+        }
+        length += leg;
     }
     return length;
 }

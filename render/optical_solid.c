@@ -92,20 +92,19 @@ static bool graph_path(alb_bends *path, alb_search *search, const alb_optical_so
     return true;
 }
 
-// The path around what is in the way of a chord; its length INFINITY where none was found. The two points lie on, or
+// The path around what is in the way of a chord; its length INFINITY where none was found. Its ends lie on, or
 // are, the two pieces of surface.
 static void go_around(alb_bends *path, alb_search *search, const alb_optical_solid *solid, uint32_t source,
-                      uint32_t target, alb_vector start, alb_vector end)
+                      uint32_t target, const alb_chord *chord)
 {
     alb_bends other;
     alb_vector towards;
-    path->length_mm = (double)INFINITY;
-    path->count = 2, path->at[0] = start, path->at[1] = end;
-    if (!(alb_slice_direction(&towards, solid, start, end) && alb_slice_best(path, solid, start, end, towards)) &&
-        !alb_slice_any(path, solid, start, end))
+    path->count = 2, path->at[0] = chord->from, path->at[1] = chord->to;
+    if (!(alb_slice_direction(&towards, solid, chord) && alb_slice_best(path, solid, chord, towards)) &&
+        !alb_slice_any(path, solid, chord))
         path->length_mm = (double)INFINITY;
-    if (path->length_mm <= trusted_detour * alb_length(alb_sub(end, start)) ||
-        !graph_path(&other, search, solid, source, target, start, end) ||
+    if (path->length_mm <= trusted_detour * chord->length_mm ||
+        !graph_path(&other, search, solid, source, target, chord->from, chord->to) ||
         (double)search->lengths[target] > worth_pulling * path->length_mm)
         return;
     alb_bends_pull(&other, solid);
@@ -114,20 +113,18 @@ static void go_around(alb_bends *path, alb_search *search, const alb_optical_sol
 }
 
 // Whether the chord is outside for no longer than rounding: through an edge or a corner.
-static bool only_touches(const alb_optical_solid *solid, alb_vector start, alb_vector end)
+static bool only_touches(const alb_optical_solid *solid, const alb_chord *chord)
 {
-    alb_crossing crossings[TOUCHES];
-    const size_t count = alb_voxels_crossings(crossings, TOUCHES, &solid->voxels, start, end);
     int inside = 1;
     double out = 0;
-    if (count < 2 || count > TOUCHES)
+    if (chord->count < 2 || chord->count > TOUCHES)
         return false;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < chord->count; i++) {
         if (inside <= 0)
-            out += crossings[i].at - crossings[i - 1].at;
-        inside += crossings[i].leaves ? -1 : 1;
+            out += chord->crossings[i].at - chord->crossings[i - 1].at;
+        inside += chord->crossings[i].leaves ? -1 : 1;
     }
-    return inside > 0 && out * alb_length(alb_sub(end, start)) < 4 * solid->lift_mm;
+    return inside > 0 && out * chord->length_mm < 4 * solid->lift_mm;
 }
 
 // Whether the surface leads from one triangle to the other almost straight, and how far.
@@ -166,8 +163,11 @@ double alb_optical_solid_measure(alb_search *search, const alb_optical_solid *so
     double length;
     if (from != to && is_near_flat(&length, &solid->net, from, to))
         return alb_length(alb_add(alb_times(length, alb_unit(alb_sub(middle, source))), alb_sub(point, middle)));
-    if (from == to || alb_voxels_inside(&solid->voxels, start, end) || only_touches(solid, start, end))
+    if (from == to || alb_voxels_inside(&solid->voxels, start, end))
         return alb_length(alb_sub(point, source));
-    go_around(&path, search, solid, solid->turns.of_triangle[from], solid->turns.of_triangle[to], start, end);
+    const alb_chord chord = alb_chord_between(solid, start, end);
+    if (only_touches(solid, &chord))
+        return alb_length(alb_sub(point, source));
+    go_around(&path, search, solid, solid->turns.of_triangle[from], solid->turns.of_triangle[to], &chord);
     return swing(&path, middle, point);
 }

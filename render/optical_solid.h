@@ -5,13 +5,21 @@
 #include "render/optical_path.h"
 #include "render/voxels.h"
 
-enum { ALB_BENDS_MAX = 128, ALB_NO_FACE = -1 };
+enum { ALB_BENDS_MAX = 128, ALB_CROSSINGS_MAX = 48 };
+
+// A triangle entered across one of its edges: the corner that is not on it, and what lies across the edges before and after.
+typedef struct alb_door {
+    alb_vector third;
+    uint32_t across[2]; // 3 * triangle + edge there; UINT32_MAX: none
+} alb_door;
 
 // The triangles of a body and how they join.
 typedef struct alb_surface_net {
     size_t count;
     alb_vector (*triangles)[3], *normals, *middles; // relative to `origin`
-    uint32_t (*neighbours)[3]; // across edge k -> k + 1: 3 * triangle + edge there; UINT32_MAX: none, or more than one
+    // Across edge k -> k + 1: 3 * triangle + edge there, which runs the other way; UINT32_MAX: none, or more than one.
+    uint32_t (*neighbours)[3];
+    alb_door *doors;              // [3 * triangle + edge]
     uint32_t *local, first, last; // local[patch - first]: triangle
     alb_vector origin;
     double edge_mm; // median of the longest edges
@@ -68,17 +76,25 @@ void alb_search_run(alb_search *search, const alb_optical_solid *solid, uint32_t
 // their normals: how long a string is, drawn tight about it. False where the curve does not lead there or is longer
 // than most_mm.
 bool alb_slice_along(double *length_mm, const alb_surface_net *net, uint32_t from, uint32_t to, double most_mm);
-// The shortest path from one point to another in the half plane through both that `towards` points into, along the
+// A segment between two points of the body, and where it meets the surface.
+typedef struct alb_chord {
+    alb_vector from, to, along; // along: unit
+    double length_mm;
+    size_t count; // more than ALB_CROSSINGS_MAX: too many to be kept
+    alb_crossing crossings[ALB_CROSSINGS_MAX];
+} alb_chord;
+alb_chord alb_chord_between(const alb_optical_solid *solid, alb_vector from, alb_vector to);
+// The shortest path from end to end of the chord in the half plane through it that `towards` points into, along the
 // surface where the chord leaves the body. False where the surface does not lead back to the chord, or leads through
-// another part of the outside.
-bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to, alb_vector towards);
+// another part of the outside; the latter is looked for only where the path is shorter than most_mm.
+bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, const alb_chord *chord, alb_vector towards,
+               double most_mm);
 // The same in the best of the half planes turned from that one by up to about half a radian.
-bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to,
-                    alb_vector towards);
+bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, const alb_chord *chord, alb_vector towards);
 // The best of half planes all around the chord.
-bool alb_slice_any(alb_bends *bends, const alb_optical_solid *solid, alb_vector from, alb_vector to);
+bool alb_slice_any(alb_bends *bends, const alb_optical_solid *solid, const alb_chord *chord);
 // Which half plane the surface where the chord leaves and returns speaks for; false where it does not.
-bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, alb_vector from, alb_vector to);
+bool alb_slice_direction(alb_vector *towards, const alb_optical_solid *solid, const alb_chord *chord);
 
 // Pulls a path tight and measures it.
 void alb_bends_pull(alb_bends *path, const alb_optical_solid *solid);

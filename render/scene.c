@@ -12,6 +12,9 @@ void alb_scene_free(alb_scene *scene)
     for (size_t i = 0; i < scene->light_count; i++)
         alb_light_free(&scene->lights[i]);
     free(scene->lights);
+    for (size_t i = 0; i < scene->surface_count; i++)
+        for (int k = 0; k < 3 * ALB_SIDES; k++)
+            alb_profile_free(&scene->surfaces[i].profiles[k / 3][k % 3]);
     free(scene->surfaces);
     free(scene->objects);
     *scene = (alb_scene){0};

@@ -10,6 +10,8 @@
 //                  "wax": {"measured": "wax/material.json", "path": "slab" | "solid"},
 //                  "marble": {"dipole": {"absorption_per_mm": [..], "reduced_scattering_per_mm": [..],
 //                                        "refractive_index": 1.5, "finish": "smooth" | "ground"}},
+//                  "milk": {"tabulated": {"reflection": ["r.csv", "g.csv", "b.csv"],
+//                                         "transmission": [.., .., ..], "thickness_mm": 2}},
 //                  "petal": {"multipole": {as a dipole, "thickness_mm": 2}}},
 //    "lights": [{"kind": "point", "position_mm": [..], "flux": [..]},
 //               {"kind": "spot", "position_mm": [..], "direction": [..], "half_angle_deg": 10, "flux": [..]},

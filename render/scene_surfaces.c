@@ -1,4 +1,4 @@
-// "materials" of SCENE.json: measured, a dipole, a multipole, or opaque.
+// "materials" of SCENE.json: measured, a dipole, a multipole, tabulated, or opaque.
 #include "base/memory.h"
 #include "render/scene_reader.h"
 #include <stdio.h>
@@ -103,6 +103,39 @@ static bool read_multipole(alb_surface *surface, alb_node node, alb_error *error
     return true;
 }
 
+// A file for each channel, R, G and B.
+static bool read_tables(alb_profile profiles[3], alb_scene_reader *in, alb_node node, const char *key)
+{
+    alb_node list;
+    size_t count;
+    if (!alb_node_list(&list, &count, node, key, in->error))
+        return false;
+    if (count != 3)
+        return alb_node_fail(in->error, node, key, "%zu files; one for each of R, G and B is wanted", count);
+    for (size_t c = 0; c < 3; c++) {
+        const char *name;
+        char path[ALB_PATH_SIZE];
+        if (!alb_node_item_text(&name, list, c, in->error) || !alb_path_join(path, in->folder, name, in->error) ||
+            !alb_provenance_add(in->provenance, path, in->error) ||
+            !alb_profile_read_table(&profiles[c], path, in->error))
+            return false;
+    }
+    return true;
+}
+
+static bool read_tabulated(alb_surface *surface, alb_scene_reader *in, alb_node node)
+{
+    alb_node tabulated;
+    if (!alb_node_allow(node, "tabulated", in->error) || !alb_node_object(&tabulated, node, "tabulated", in->error) ||
+        !alb_node_allow(tabulated, "reflection transmission thickness_mm", in->error) ||
+        !read_tables(surface->profiles[ALB_REFLECTION], in, tabulated, "reflection"))
+        return false;
+    surface->scatters = true;
+    surface->slab = alb_node_has(tabulated, "transmission");
+    return !surface->slab || (read_tables(surface->profiles[ALB_TRANSMISSION], in, tabulated, "transmission") &&
+                              alb_node_number(&surface->thickness_mm, tabulated, "thickness_mm", 1e-6, 1e6, in->error));
+}
+
 static bool read_surface(alb_surface *surface, alb_scene_reader *in, alb_node node)
 {
     if (alb_node_has(node, "measured"))
@@ -111,6 +144,8 @@ static bool read_surface(alb_surface *surface, alb_scene_reader *in, alb_node no
         return read_dipole(surface, node, in->error);
     if (alb_node_has(node, "multipole"))
         return read_multipole(surface, node, in->error);
+    if (alb_node_has(node, "tabulated"))
+        return read_tabulated(surface, in, node);
     return alb_node_allow(node, "reflectance exitance", in->error) &&
            alb_node_numbers(surface->reflectance, 3, node, "reflectance", 0, 1, in->error) &&
            (!alb_node_has(node, "exitance") ||
@@ -127,6 +162,7 @@ bool alb_scene_read_surfaces(alb_scene_reader *in, alb_node root)
         return alb_node_fail(in->error, list, NULL, "%zu materials; at most %d", count, ALB_SURFACES_MAX);
     if (!(in->scene->surfaces = alb_allocate(count, sizeof *in->scene->surfaces, in->error)))
         return false;
+    in->scene->surface_count = count;
     for (size_t i = 0; i < count; i++) {
         const char *name = alb_node_key(list, i);
         alb_node node;
@@ -136,6 +172,5 @@ bool alb_scene_read_surfaces(alb_scene_reader *in, alb_node root)
         if (!alb_node_object(&node, list, name, in->error) || !read_surface(&in->scene->surfaces[i], in, node))
             return false;
     }
-    in->scene->surface_count = count;
     return true;
 }

@@ -52,7 +52,15 @@ static bool emits(const alb_shadow_stage *stage, const alb_scene *scene, size_t 
     return false;
 }
 
-// Vertices that are seen, of what does not emit. False where there are hardly any.
+// Where scattering is part of the transport rays say nothing.
+static bool scatters(const alb_shadow_stage *stage, size_t vertex)
+{
+    const alb_shadow_transport *t = &stage->transport;
+    const uint32_t row = t->row_count ? t->rows[vertex] : ALB_TRANSPORT_NONE;
+    return row != ALB_TRANSPORT_NONE && t->matrix_of[row] != ALB_TRANSPORT_NONE;
+}
+
+// Vertices that are seen, of what does not emit and does not scatter by transport. False where there are hardly any.
 static bool draw(samples *s, const alb_tracer *tracer, const alb_shadow_stage *stage, const alb_scene *scene,
                  double offset_mm, uint64_t seed)
 {
@@ -64,7 +72,7 @@ static bool draw(samples *s, const alb_tracer *tracer, const alb_shadow_stage *s
             if (++tries > 1000)
                 return false;
             v = (size_t)(alb_random_uniform(&random) * (double)scene->mesh.vertex_count);
-        } while (emits(stage, scene, v) ||
+        } while (emits(stage, scene, v) || scatters(stage, v) ||
                  alb_shadow_buried(tracer, scene->mesh.vertices[v], stage->normals[v], offset_mm));
         s->points[n] = scene->mesh.vertices[v];
         s->normals[n] = stage->normals[v];

@@ -143,6 +143,7 @@ static bool report(const sequence *s, bool as_json, alb_error *error)
     alb_json_integer(&json, "occluders", (long)s->stage.occluder_count);
     alb_json_integer(&json, "lights", (long)s->stage.light_count);
     alb_json_integer(&json, "transport_vertices", (long)s->stage.transport.row_count);
+    alb_json_integer(&json, "translucent_vertices", (long)s->stage.transport.matrix_count);
     alb_json_integer(&json, "order", settings->order);
     alb_json_integer(&json, "cells", settings->cells);
     alb_json_integer(&json, "shells_outside", settings->outer);

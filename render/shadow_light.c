@@ -35,7 +35,7 @@ typedef struct block {
     alb_vector points[BLOCK], normals[BLOCK];
     float cosine[VALUES * BLOCK];                         // max(0, n.d)
     float lobe[ALB_SH_COUNT_MAX * BLOCK];                 // the same, or precomputed transport: what skies light
-    bool in_body[BLOCK];                                  // receivers with transport
+    bool in_body[BLOCK], coloured;                        // receivers with transport; if the colours' lobes differ
     size_t own[BLOCK];                                    // occluder on whose probed surface a receiver lies, or none
     float hidden[VALUES * BLOCK];                         // by it, of the cosine
     double distances_mm[ALB_SHADOW_OCCLUDERS_MAX][BLOCK]; // to the occluders' centres
@@ -62,8 +62,8 @@ static void set_lobes(block *b, const alb_shadow_world *world)
                 b->lobe[(size_t)i * BLOCK + r] *= (float)(sqrt(4 * M_PI / (2 * l + 1)) * zonal[l]);
     memcpy(b->cosine, b->lobe, sizeof b->cosine);
     memset(b->in_body, 0, sizeof b->in_body);
-    if (world->transport)
-        alb_shadow_transport_lobes(b->lobe, b->in_body, world->transport, b->first, b->count);
+    b->coloured =
+        world->transport && alb_shadow_transport_lobes(b->lobe, b->in_body, world->transport, 0, b->first, b->count);
 }
 
 static void find_own(block *b, const alb_shadow_world *world)
@@ -277,6 +277,20 @@ static bool check(const alb_shadow_world *world, const alb_vector *points, size_
     return true;
 }
 
+static void add_skies(float (*irradiance)[3], block *b, const alb_shadow_world *world)
+{
+    for (int c = 0; c < (b->coloured ? 3 : 1); c++) {
+        float sum[BLOCK][3] = {{0}};
+        if (c)
+            alb_shadow_transport_lobes(b->lobe, b->in_body, world->transport, c, b->first, b->count);
+        for (size_t j = 0; j < world->sky_count; j++)
+            add_sky(sum, b, world, &world->skies[j]);
+        for (size_t r = 0; r < b->count; r++)
+            for (int d = c; d < (b->coloured ? c + 1 : 3); d++)
+                irradiance[r][d] += sum[r][d];
+    }
+}
+
 static void light_block(float (*irradiance)[3], block *b, const alb_shadow_world *world)
 {
     memset(irradiance, 0, b->count * sizeof *irradiance);
@@ -287,8 +301,7 @@ static void light_block(float (*irradiance)[3], block *b, const alb_shadow_world
     const double found_s = alb_clock_s();
     for (size_t j = 0; j < world->light_count; j++)
         add_light(irradiance, b, world, &world->lights[j]);
-    for (size_t j = 0; j < world->sky_count; j++)
-        add_sky(irradiance, b, world, &world->skies[j]);
+    add_skies(irradiance, b, world);
     b->seconds.scaling += found_s - start_s;
     b->seconds.products += alb_clock_s() - found_s;
 }

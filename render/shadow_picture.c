@@ -1,6 +1,6 @@
 // Albedo: an opaque surface's reflectance; of a translucent one the total of its reflection profile, which is what all
 // of it together gives back of even light. Stops being true where light comes out far from where it went in: shadows on
-// translucent materials are as sharp as on opaque ones here.
+// translucent materials are as sharp as on opaque ones here, but for those of environments on rigid bodies (transport).
 #include "render/shadow_picture.h"
 #include "base/memory.h"
 #include "render/shadow_rays.h"

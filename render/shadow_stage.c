@@ -59,6 +59,8 @@ static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o,
         (light || !settings.probes ||
          alb_shadow_surface_create(&stage->surfaces[index], &mesh, stage->normals + scene->objects[o].first_vertex,
                                    (size_t)settings.probes, error));
+    if (!ok)
+        alb_shadow_field_free(&stage->fields[index]);
     *(light ? &stage->light_count : &stage->occluder_count) += ok;
     free(radiance);
     alb_mesh_free(&mesh);

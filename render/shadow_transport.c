@@ -137,7 +137,7 @@ bool alb_shadow_transport_create(alb_shadow_transport *t, const alb_scene *scene
     }
     ok = ok && (t->vectors = alb_allocate(t->row_count, sizeof *t->vectors, error)) &&
          (!t->row_count || (collect_casters(&casters, t, scene, error) && alb_tracer_create(&tracer, &casters, error) &&
-                            find_vectors(t, &tracer, normals, error)));
+                            find_vectors(t, &tracer, normals, error) && alb_shadow_transport_scatter(t, scene, error)));
     alb_tracer_free(&tracer);
     alb_mesh_free(&casters);
     if (!ok)
@@ -151,6 +151,8 @@ void alb_shadow_transport_free(alb_shadow_transport *t)
     free(t->rows);
     free(t->rest);
     free(t->vectors);
+    free(t->matrix_of);
+    free(t->matrices);
     *t = (alb_shadow_transport){0};
 }
 
@@ -213,16 +215,21 @@ bool alb_shadow_transport_follow(alb_shadow_transport *t, const alb_vector *vert
     return true;
 }
 
-void alb_shadow_transport_lobes(float *lobes, bool *in_body, const alb_shadow_transport *t, size_t first, size_t count)
+bool alb_shadow_transport_lobes(float *lobes, bool *in_body, const alb_shadow_transport *t, int colour, size_t first,
+                                size_t count)
 {
     enum { BLOCK = ALB_SHADOW_BLOCK };
     float own[VALUES * BLOCK], turns[4 * BLOCK];
     size_t found = 0;
+    bool coloured = false;
     for (size_t r = 0; r < count; r++) {
         const uint32_t row = t->row_count ? t->rows[first + r] : ALB_TRANSPORT_NONE;
         in_body[r] = row != ALB_TRANSPORT_NONE;
+        const bool translucent = in_body[r] && t->matrix_of[row] != ALB_TRANSPORT_NONE;
+        const float *vector = translucent ? t->matrices[t->matrix_of[row]][colour] : t->vectors[in_body[r] ? row : 0];
         for (size_t i = 0; in_body[r] && i < VALUES; i++)
-            own[i * BLOCK + found] = t->vectors[row][i];
+            own[i * BLOCK + found] = vector[i];
+        coloured |= translucent;
         for (size_t i = 0; in_body[r] && i < 4; i++)
             turns[i * BLOCK + found] = t->quaternion[i];
         found += in_body[r];
@@ -233,4 +240,5 @@ void alb_shadow_transport_lobes(float *lobes, bool *in_body, const alb_shadow_tr
     for (size_t r = 0, k = 0; r < count; k += in_body[r++])
         for (size_t i = 0; in_body[r] && i < VALUES; i++)
             lobes[i * BLOCK + r] = own[i * BLOCK + k];
+    return coloured;
 }

@@ -5,6 +5,7 @@
 
 typedef struct half_edge {
     uint32_t low, high, place; // place: 3 * triangle + edge
+    bool up;                   // from low to high
 } half_edge;
 
 static int by_ends(const void *a, const void *b)
@@ -25,20 +26,27 @@ static bool join(alb_surface_net *net, const alb_body *body, const alb_mesh *mes
         return false;
     for (size_t i = 0; i < count; i++) {
         const uint32_t *face = mesh->faces[body->patches[i / 3]], a = face[i % 3], b = face[(i + 1) % 3];
-        edges[i] = (half_edge){a < b ? a : b, a < b ? b : a, (uint32_t)i};
+        edges[i] = (half_edge){a < b ? a : b, a < b ? b : a, (uint32_t)i, a < b};
         net->neighbours[i / 3][i % 3] = UINT32_MAX;
     }
     qsort(edges, count, sizeof *edges, by_ends);
     for (size_t i = 0, next; i < count; i = next) {
         for (next = i + 1; next < count && edges[next].low == edges[i].low && edges[next].high == edges[i].high; next++)
             ;
-        if (next - i != 2)
+        if (next - i != 2 || edges[i].up == edges[i + 1].up)
             continue;
         const uint32_t a = edges[i].place, b = edges[i + 1].place;
         net->neighbours[a / 3][a % 3] = b, net->neighbours[b / 3][b % 3] = a;
     }
     free(edges);
     return true;
+}
+
+static void hang_doors(alb_surface_net *net)
+{
+    for (size_t i = 0; i < 3 * net->count; i++)
+        net->doors[i] = (alb_door){net->triangles[i / 3][(i + 2) % 3],
+                                   {net->neighbours[i / 3][(i + 2) % 3], net->neighbours[i / 3][(i + 1) % 3]}};
 }
 
 static int by_value(const void *a, const void *b)
@@ -87,9 +95,12 @@ bool alb_surface_net_create(alb_surface_net *net, const alb_body *body, const al
         (net->normals = alb_allocate(n, sizeof *net->normals, error)) &&
         (net->middles = alb_allocate(n, sizeof *net->middles, error)) &&
         (net->neighbours = alb_allocate(n, sizeof *net->neighbours, error)) &&
+        (net->doors = alb_allocate(3 * n, sizeof *net->doors, error)) &&
         (net->local = alb_allocate((size_t)(net->last - net->first) + 1, sizeof *net->local, error)) &&
-        fill(net, body, patches, error) && join(net, body, patches->mesh, error))
+        fill(net, body, patches, error) && join(net, body, patches->mesh, error)) {
+        hang_doors(net);
         return true;
+    }
     alb_surface_net_free(net);
     return false;
 }
@@ -100,6 +111,7 @@ void alb_surface_net_free(alb_surface_net *net)
     free(net->normals);
     free(net->middles);
     free(net->neighbours);
+    free(net->doors);
     free(net->local);
     *net = (alb_surface_net){0};
 }

@@ -208,6 +208,23 @@ static void sweep(alb_voxels *v, int way)
             }
 }
 
+// Four roundings of numbers as large as the box.
+static bool fill_planes(alb_voxels *v, alb_error *error)
+{
+    const size_t total = v->starts[voxel_count(v)];
+    if (!(v->planes = alb_allocate(total, sizeof *v->planes, error)))
+        return false;
+    v->margin = 4 * 0x1p-23F * (float)(v->n[0] + v->n[1] + v->n[2]);
+    for (size_t i = 0; i < total; i++) {
+        const alb_vector *t = v->triangles[v->lists[i]],
+                         n = alb_unit(alb_cross(alb_sub(t[1], t[0]), alb_sub(t[2], t[0])));
+        const float plane[4] = {(float)n.x, (float)n.y, (float)n.z,
+                                (float)(alb_dot(n, alb_sub(t[0], v->low)) / v->size_mm)};
+        memcpy(v->planes[i], plane, sizeof plane);
+    }
+    return true;
+}
+
 bool alb_voxels_create(alb_voxels *voxels, const alb_vector (*triangles)[3], size_t count, double size_mm, size_t most,
                        bool closed, alb_error *error)
 {
@@ -216,7 +233,7 @@ bool alb_voxels_create(alb_voxels *voxels, const alb_vector (*triangles)[3], siz
     const size_t n = voxel_count(voxels);
     if (!(voxels->state = alb_allocate(n, 1, error)) || !(voxels->clear = alb_allocate(n, 1, error)) ||
         !(voxels->starts = alb_allocate(n + 1, sizeof *voxels->starts, error)) || !fill_lists(voxels, error) ||
-        !fill_states(voxels, closed, error)) {
+        !fill_planes(voxels, error) || !fill_states(voxels, closed, error)) {
         alb_voxels_free(voxels);
         return false;
     }
@@ -233,11 +250,14 @@ void alb_voxels_free(alb_voxels *voxels)
     free(voxels->clear);
     free(voxels->starts);
     free(voxels->lists);
+    free(voxels->planes);
     *voxels = (alb_voxels){0};
 }
 
 size_t alb_voxels_bytes(const alb_voxels *voxels)
 {
     const size_t n = voxel_count(voxels);
-    return voxels->starts ? n * (2 + sizeof(uint32_t)) + voxels->starts[n] * sizeof(uint32_t) : 0;
+    return voxels->starts
+               ? n * (2 + sizeof(uint32_t)) + voxels->starts[n] * (sizeof *voxels->lists + sizeof *voxels->planes)
+               : 0;
 }

@@ -16,6 +16,8 @@ typedef struct alb_voxels {
     unsigned char *state;     // [(k n[1] + j) n[0] + i]
     unsigned char *clear;     // within so many voxels in every direction all have the same state; of surface voxels 0
     uint32_t *starts, *lists; // triangles that touch a surface voxel; starts has one entry more than there are voxels
+    float (*planes)[4];       // of each entry of the lists, in voxels from low: unit normal, its product with a corner
+    float margin;             // what those may be wrong by
     size_t unsure;            // voxels whose winding number is more than 0.1 away from a whole number
 } alb_voxels;
 

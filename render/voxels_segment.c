@@ -1,7 +1,8 @@
 // Segments through a body in voxels.
 //
 // A segment walks from voxel to voxel (Amanatides & Woo 1987), leaps where all around has one state, and tests the
-// triangles of the voxels that it enters. Two triangles evaluate the edge that they share with the same operations, so
+// triangles of the voxels that it enters. Those whose plane its piece within the voxel clearly does not meet are passed
+// over in single precision; of the others, two triangles evaluate the edge that they share with the same operations, so
 // a segment cannot slip between them: crossings are exactly odd and even but for one that runs in a triangle's plane.
 #include "render/voxels.h"
 #include <math.h>
@@ -24,8 +25,9 @@ int alb_voxels_state(const alb_voxels *voxels, alb_vector point)
 // A walk along a segment, in voxels; t runs from 0 to 1.
 typedef struct walk {
     const alb_voxels *voxels;
-    double start[3], way[3], inverse[3], longest, t;
-    int cell[3];
+    double start[3], way[3], inverse[3], longest, t, until;
+    int cell[3], axis;          // where it leaves the cell, at `until`
+    float enters[3], leaves[3]; // of a surface voxel: the piece of the segment within
 } walk;
 
 static void walk_begin(walk *w, const alb_voxels *v, alb_vector from, alb_vector to)
@@ -40,11 +42,49 @@ static void walk_begin(walk *w, const alb_voxels *v, alb_vector from, alb_vector
     }
 }
 
+static void find_exit(walk *w)
+{
+    w->until = (double)INFINITY;
+    for (int a = 0; a < 3; a++) {
+        const double t =
+            w->way[a] != 0 ? (w->cell[a] + (w->way[a] > 0) - w->start[a]) * w->inverse[a] : (double)INFINITY;
+        if (t < w->until)
+            w->until = t, w->axis = a;
+    }
+}
+
+// The triangles of the voxel that the walk is in, from first to end; none but in surface voxels.
+static uint32_t look_around(walk *w, uint32_t *end, size_t voxel)
+{
+    const alb_voxels *v = w->voxels;
+    const uint32_t first = v->starts[voxel];
+    *end = v->starts[voxel + 1];
+    if (first == *end)
+        return first;
+    find_exit(w);
+    const double until = w->until < 1 ? w->until : 1;
+    for (int a = 0; a < 3; a++) {
+        w->enters[a] = (float)(w->start[a] + w->t * w->way[a]);
+        w->leaves[a] = (float)(w->start[a] + until * w->way[a]);
+    }
+    return first;
+}
+
+// Whether the piece of the segment lies clearly on one side of the triangle's plane.
+static bool passes_by(const walk *w, uint32_t entry)
+{
+    const float *p = w->voxels->planes[entry], margin = w->voxels->margin;
+    const float a = p[0] * w->enters[0] + p[1] * w->enters[1] + p[2] * w->enters[2] - p[3];
+    const float b = p[0] * w->leaves[0] + p[1] * w->leaves[1] + p[2] * w->leaves[2] - p[3];
+    return (a > margin && b > margin) || (a < -margin && b < -margin);
+}
+
 // To the next voxel of another state or, from a surface voxel, to the next; false at the end.
 static bool walk_step(walk *w)
 {
     const alb_voxels *v = w->voxels;
-    const int clear = v->clear[index_of(v, w->cell[0], w->cell[1], w->cell[2])];
+    const size_t voxel = index_of(v, w->cell[0], w->cell[1], w->cell[2]);
+    const int clear = v->clear[voxel];
     if (clear > 0) {
         w->t += clear / w->longest;
         if (!(w->t < 1))
@@ -53,17 +93,11 @@ static bool walk_step(walk *w)
             w->cell[a] = clamped(floor(w->start[a] + w->t * w->way[a]), v->n[a]);
         return true;
     }
-    int axis = 0;
-    double nearest = INFINITY;
-    for (int a = 0; a < 3; a++) {
-        const double t =
-            w->way[a] != 0 ? (w->cell[a] + (w->way[a] > 0) - w->start[a]) * w->inverse[a] : (double)INFINITY;
-        if (t < nearest)
-            nearest = t, axis = a;
-    }
-    w->t = nearest > w->t ? nearest : w->t;
-    w->cell[axis] += w->way[axis] > 0 ? 1 : -1;
-    return nearest < 1 && w->cell[axis] >= 0 && w->cell[axis] < v->n[axis];
+    if (v->starts[voxel] == v->starts[voxel + 1])
+        find_exit(w);
+    w->t = w->until > w->t ? w->until : w->t;
+    w->cell[w->axis] += w->way[w->axis] > 0 ? 1 : -1;
+    return w->until < 1 && w->cell[w->axis] >= 0 && w->cell[w->axis] < v->n[w->axis];
 }
 
 // Whether the segment meets the triangle; edges and corners count to all triangles that share them.
@@ -92,9 +126,10 @@ bool alb_voxels_inside(const alb_voxels *voxels, alb_vector from, alb_vector to)
         const size_t voxel = index_of(voxels, w.cell[0], w.cell[1], w.cell[2]);
         if (voxels->state[voxel] == ALB_VOXEL_OUTSIDE)
             return false;
-        for (uint32_t i = voxels->starts[voxel]; i < voxels->starts[voxel + 1]; i++) {
+        uint32_t end;
+        for (uint32_t i = look_around(&w, &end, voxel); i < end; i++) {
             alb_crossing crossing;
-            if (meets(&crossing, voxels, voxels->lists[i], from, way))
+            if (!passes_by(&w, i) && meets(&crossing, voxels, voxels->lists[i], from, way))
                 return false;
         }
     } while (walk_step(&w));
@@ -125,9 +160,10 @@ size_t alb_voxels_crossings(alb_crossing *crossings, size_t most, const alb_voxe
     walk_begin(&w, voxels, from, to);
     do {
         const size_t voxel = index_of(voxels, w.cell[0], w.cell[1], w.cell[2]);
-        for (uint32_t i = voxels->starts[voxel]; i < voxels->starts[voxel + 1]; i++) {
+        uint32_t end;
+        for (uint32_t i = look_around(&w, &end, voxel); i < end; i++) {
             alb_crossing crossing;
-            if (!meets(&crossing, voxels, voxels->lists[i], from, way))
+            if (passes_by(&w, i) || !meets(&crossing, voxels, voxels->lists[i], from, way))
                 continue;
             if (count == most)
                 return most + 1;

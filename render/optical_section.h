@@ -1,0 +1,24 @@
+// Curves in which a plane cuts the surface of a body, and the string drawn tight about them. In coordinates of the
+// plane: x along a chord of the body from its start, y upwards to the side of the path.
+#pragma once
+#include "render/optical_solid.h"
+
+typedef struct alb_section_plane {
+    alb_vector origin, along, up, normal;
+} alb_section_plane;
+
+// Where the section crosses an edge of the mesh.
+typedef struct alb_cut {
+    double x, y;
+    uint32_t place; // 3 * triangle + edge, of the triangle that the curve enters there
+    int order;      // along the curve; the next curve begins with a gap
+} alb_cut;
+
+// The plane through the line that holds `towards`; up is zero where that lies on the line.
+alb_section_plane alb_section_through(alb_vector origin, alb_vector along, alb_vector towards);
+// Follows the curve (its number for the order) upwards from where the chord leaves, by crossing `first`, until it is
+// back at the chord, and adds its cuts, at most `most` in all. The crossing by which it returns; -1 where it does not.
+int alb_section_follow(alb_cut *cuts, int *cut_count, int most, int curve, const alb_surface_net *net,
+                       const alb_section_plane *plane, const alb_chord *chord, size_t first);
+// The string from (0, 0) over the cuts to (length, 0): those it touches, in place; how many.
+int alb_section_tighten(alb_cut *cuts, int count, double length);
