@@ -15,12 +15,18 @@ typedef struct extent {
 
 static float find_extents(extent *extents, const alb_forest *forest, uint32_t node, uint32_t first_leaf, uint32_t count)
 {
+    if (count == 1)
+        return forest->areas_mm2[first_leaf];
     const uint32_t left = alb_left_count(count);
-    const float area = count == 1 ? forest->areas_mm2[first_leaf]
-                                  : find_extents(extents, forest, node + 1, first_leaf, left) +
-                                        find_extents(extents, forest, node + 2 * left, first_leaf + left, count - left);
+    const float area = find_extents(extents, forest, node + 1, first_leaf, left) +
+                       find_extents(extents, forest, node + left, first_leaf + left, count - left);
     extents[node] = (extent){first_leaf, count, area};
     return area;
+}
+
+static inline extent extent_of_leaf(const alb_forest *forest, uint32_t leaf)
+{
+    return (extent){leaf, 1, forest->areas_mm2[leaf]};
 }
 
 // One row under way.
@@ -59,32 +65,34 @@ static void add_links(row rows[ALB_BLOCK], int channel, const alb_link_block *bl
     const uint8_t *code = block->codes;
     for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; run++) {
         const alb_scatter_kernel *kernel = &kernels[run->kernel];
-        const float(*table)[16] = (const float(*)[16])kernel->values + (run->octave - kernel->first_used) * ALB_CODES;
-        const int parts = alb_levels[run->level].parts;
-        uint32_t node = run->first;
+        const float(*table)[4] = (const float(*)[4])kernel->values + (run->octave - kernel->first_used) * ALB_CODES;
+        uint32_t source = run->first;
         for (uint32_t k = 0; k < run->count; k++) {
-            node += *delta++;
-            const float share = extents[node].area_mm2 / (float)parts;
-            for (int part = 0; part < parts; part++)
+            source += *delta++;
+            code += alb_link_bend_bytes(run->kind);
+            const extent from = run->kind <= ALB_LINK_NEAR_NODE ? extents[source] : extent_of_leaf(forest, source);
+            for (int share = 0; share < alb_link_codes(run->kind); share++)
                 for (uint32_t r = 0; r < ALB_BLOCK; r++, code++)
                     if (*code != ALB_NO_LINK)
-                        add_source(&rows[r], table[*code][channel] * share, &extents[node], forest->patches);
+                        add_source(&rows[r], table[*code][channel] * from.area_mm2 * alb_link_share(run->kind, share),
+                                   &from, forest->patches);
         }
     }
-    for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++)
-        add_source(&rows[pair->row], pair->weights[channel] * extents[pair->node].area_mm2, &extents[pair->node],
-                   forest->patches);
+    for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++) {
+        const extent from = extent_of_leaf(forest, pair->leaf);
+        add_source(&rows[pair->row], pair->weights[channel] * from.area_mm2, &from, forest->patches);
+    }
 }
 
 bool alb_links_sample(uint32_t *sources, const uint32_t *first, int channel, const alb_links *links,
                       const alb_forest *forest, const alb_scatter_kernel *kernels, const double (*totals)[3],
                       const double (*local)[3], size_t patch_count, alb_error *error)
 {
-    extent *extents = alb_allocate(forest->node_count, sizeof *extents, error);
+    extent *extents = alb_allocate(forest->leaf_count, sizeof *extents, error);
     if (!extents)
         return false;
     for (const alb_tree *tree = forest->trees; tree < forest->trees + forest->tree_count; tree++)
-        find_extents(extents, forest, tree->first_node, tree->first_leaf, tree->leaf_count);
+        find_extents(extents, forest, tree->first_cluster - tree->first_leaf, tree->first_leaf, tree->leaf_count);
     for (uint32_t p = 0; p < patch_count; p++) // what no link reaches comes from the patch itself
         for (uint32_t k = first[p]; k < first[p + 1]; k++)
             sources[k] = p;
