@@ -81,7 +81,7 @@ static bool make_model(model *m, const alb_scene *scene, alb_error *error)
     }
     for (int k = 0; ok && k < 2; k++) {
         alb_shadow_settings settings = alb_shadow_defaults;
-        settings.inner = k ? 2 : 0, settings.outer = k ? 2 : 1, settings.distance = k ? 1.1 : 1.05;
+        settings.inner = k ? 2 : 0, settings.far = k, settings.distance = k ? 1.1 : 1.05;
         ok = alb_shadow_laws_create(&m->laws[k], 4, !k, error) &&
              alb_shadow_field_create(&m->fields[k], &settings, &m->mesh, NULL, "model", error) &&
              alb_shadow_field_sample(&m->fields[k], m->mesh.vertices, error);
@@ -210,7 +210,7 @@ static bool make_full(alb_shadow_field *shells, const model *m, alb_error *error
         settings.inner = radius < 1.1, settings.distance = fmax(radius, 1.1);
         ok = alb_shadow_field_create(&shells[s], &settings, &m->mesh, NULL, "model", error);
         if (ok && settings.inner)
-            shells[s].radii[0] = radius;
+            shells[s].shells[0].radius = radius;
         ok = ok && alb_shadow_field_sample(&shells[s], m->mesh.vertices, error);
     }
     return ok;
@@ -283,6 +283,7 @@ static bool write_full(const char *folder, const model *m, const alb_scene *scen
     static alb_shadow_field shells[FULL];
     pictures p = {0};
     alb_shadow_stage stage = {.settings = alb_shadow_defaults};
+    stage.settings.probes = 0;
     const size_t n = scene->mesh.vertex_count;
     float(*black)[3] = calloc(scene->mesh.face_count, sizeof *black);
     bool ok = black && (p.truth = calloc(n, sizeof *p.truth)) && alb_shadow_stage_light(&stage, scene, error) &&
@@ -301,7 +302,8 @@ static bool write_full(const char *folder, const model *m, const alb_scene *scen
         static const char *const names[3] = {"1 shell, as printed", "1 shell", "4 shells"};
         alb_shadow_stage_free(&stage);
         stage = (alb_shadow_stage){.settings = alb_shadow_defaults, .paper = !k};
-        stage.settings.inner = k == 2 ? 2 : 0, stage.settings.outer = k == 2 ? 2 : 1;
+        stage.settings.probes = 0; // fields alone
+        stage.settings.inner = k == 2 ? 2 : 0, stage.settings.far = k == 2;
         ok = alb_shadow_stage_light(&stage, scene, error) && show(&p, 2 + k, names[k], scene, &stage, error);
     }
     char path[1024];
