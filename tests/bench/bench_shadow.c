@@ -19,21 +19,22 @@
 #include <string.h>
 #include <time.h>
 
-enum { SAMPLES = 2000, WAYS = 8, RAYS = 4, CHECKED = 3, SHADE = 160 };
+enum { SAMPLES = 2000, WAYS = 9, RAYS = 4, CHECKED = 3, SHADE = 160 };
 
 static const struct {
     const char *name;
-    bool paper, regressed, transport;
+    bool paper, regressed, transport, probes;
     int order, outer, inner, cells, pixels;
     double cluster;
-} ways[WAYS] = {{"as printed", true, false, false, 4, 1, 0, 8, 32, 0},
-                {"windowed", false, false, false, 4, 1, 0, 8, 64, 0.04},
-                {"regressed", false, true, false, 4, 1, 0, 8, 64, 0.04},
-                {"order 8 to 4", false, false, false, 8, 1, 0, 8, 64, 0.04},
-                {"2 shells", false, false, false, 4, 2, 0, 8, 64, 0.04},
-                {"4 shells", false, false, false, 4, 1, 2, 8, 64, 0.04},
-                {"4 shells, order 8", false, false, false, 8, 1, 2, 12, 64, 0.02},
-                {"transport", false, false, true, 4, 1, 0, 8, 64, 0.04}};
+} ways[WAYS] = {{"as printed", true, false, false, false, 4, 1, 0, 8, 32, 0},
+                {"windowed", false, false, false, false, 4, 1, 0, 8, 64, 0.04},
+                {"regressed", false, true, false, false, 4, 1, 0, 8, 64, 0.04},
+                {"order 8 to 4", false, false, false, false, 8, 1, 0, 8, 64, 0.04},
+                {"2 shells", false, false, false, false, 4, 2, 0, 8, 64, 0.04},
+                {"4 shells", false, false, false, false, 4, 1, 2, 8, 64, 0.04},
+                {"4 shells, order 8", false, false, false, false, 8, 1, 2, 12, 64, 0.02},
+                {"transport", false, false, true, false, 4, 1, 0, 8, 64, 0.04},
+                {"probes", false, false, false, true, 4, 1, 0, 8, 64, 0.04}};
 #define BOTTOM 0.3 // percent, of the chart
 static const int strata[RAYS] = {4, 8, 16, 32};
 
@@ -75,6 +76,8 @@ static alb_shadow_stage stage_of(int way)
     stage.settings.cells = ways[way].cells;
     stage.settings.pixels = ways[way].pixels;
     stage.settings.cluster = ways[way].cluster;
+    if (!ways[way].probes)
+        stage.settings.probes = 0;
     return stage;
 }
 
@@ -264,8 +267,8 @@ typedef struct figures {
 
 static bool chart(const char *path, const figures *f, alb_error *error)
 {
-    static const char *const colours[WAYS] = {"#d62728", "#1f77b4", "#17becf", "#9467bd",
-                                              "#2ca02c", "#8c564b", "#e377c2", "#000"};
+    static const char *const colours[WAYS] = {"#d62728", "#1f77b4", "#17becf", "#9467bd", "#2ca02c",
+                                              "#8c564b", "#e377c2", "#000",    "#ff7f0e"};
     static double shade_x[SHADOW_SCENES][2 * SHADE], shade_y[SHADOW_SCENES][2 * SHADE], twice[SHADOW_SCENES][WAYS][2];
     alb_curve curves[SHADOW_SCENES][WAYS + 3];
     alb_panel panels[SHADOW_SCENES];
@@ -332,7 +335,7 @@ static bool draw_frames(const char *chart_path, alb_error *error)
     for (int i = 0; ok && i < SHADOW_SCENES; i++) {
         alb_scene scene;
         alb_image picture = {0};
-        alb_shadow_stage stage = stage_of(5); // with transport where a scene has rigid objects
+        alb_shadow_stage stage = stage_of(WAYS - 1); // with transport where a scene has rigid objects
         double brightest, exposure;
         if (!shadow_scenes[i].create(&scene, 12, error))
             break;
