@@ -12,6 +12,7 @@
 #include "render/shadow_rays.h"
 #include "render/shadow_stage.h"
 #include "render/view.h"
+#include "scenes/shadow_full.h"
 #include "scenes/shadow_scenes.h"
 #include <omp.h>
 #include <stdio.h>
@@ -19,21 +20,22 @@
 #include <string.h>
 #include <time.h>
 
-enum { SAMPLES = 2000, WAYS = 8, RAYS = 4, CHECKED = 3, SHADE = 160 };
+enum { SAMPLES = 2000, WAYS = 9, RAYS = 4, CHECKED = 3, SHADE = 160 };
 
 static const struct {
     const char *name;
-    bool paper, regressed, transport;
+    enum { FIELDS, PAPER, REGRESSED, TRANSPORT, FULL } kind;
     int order, outer, inner, cells, pixels;
     double cluster;
-} ways[WAYS] = {{"as printed", true, false, false, 4, 1, 0, 8, 32, 0},
-                {"windowed", false, false, false, 4, 1, 0, 8, 64, 0.04},
-                {"regressed", false, true, false, 4, 1, 0, 8, 64, 0.04},
-                {"order 8 to 4", false, false, false, 8, 1, 0, 8, 64, 0.04},
-                {"2 shells", false, false, false, 4, 2, 0, 8, 64, 0.04},
-                {"4 shells", false, false, false, 4, 1, 2, 8, 64, 0.04},
-                {"4 shells, order 8", false, false, false, 8, 1, 2, 12, 64, 0.02},
-                {"transport", false, false, true, 4, 1, 0, 8, 64, 0.04}};
+} ways[WAYS] = {{"as printed", PAPER, 4, 1, 0, 8, 32, 0},
+                {"windowed", FIELDS, 4, 1, 0, 8, 64, 0.04},
+                {"regressed", REGRESSED, 4, 1, 0, 8, 64, 0.04},
+                {"order 8 to 4", FIELDS, 8, 1, 0, 8, 64, 0.04},
+                {"2 shells", FIELDS, 4, 2, 0, 8, 64, 0.04},
+                {"4 shells", FIELDS, 4, 1, 2, 8, 64, 0.04},
+                {"4 shells, order 8", FIELDS, 8, 1, 2, 12, 64, 0.02},
+                {"transport", TRANSPORT, 4, 1, 0, 8, 64, 0.04},
+                {"16 shells", FULL, 4, 1, 0, 8, 64, 0.04}};
 #define BOTTOM 0.3 // percent, of the chart
 static const int strata[RAYS] = {4, 8, 16, 32};
 
@@ -63,11 +65,9 @@ static bool take_regressed(alb_shadow_stage *stage, alb_error *error)
     return alb_sh_batch_create(&stage->laws.outer, &law, 256, error);
 }
 
-static bool has_rigid(const alb_scene *scene) { return scene->objects[scene->object_count - 1].rigid; }
-
 static alb_shadow_stage stage_of(int way)
 {
-    alb_shadow_stage stage = {.settings = alb_shadow_defaults, .paper = ways[way].paper};
+    alb_shadow_stage stage = {.settings = alb_shadow_defaults, .paper = ways[way].kind == PAPER};
     stage.settings.order = ways[way].order;
     stage.settings.outer = ways[way].outer;
     stage.settings.inner = ways[way].inner;
@@ -84,7 +84,7 @@ static bool create_scene(alb_scene *scene, int index, int frame, int way, alb_er
     if (!shadow_scenes[index].create(scene, frame, error))
         return false;
     for (size_t o = 0; o < scene->object_count; o++)
-        scene->objects[o].rigid &= ways[way].transport;
+        scene->objects[o].rigid &= ways[way].kind == TRANSPORT;
     return true;
 }
 
@@ -154,57 +154,91 @@ static double error_of(const truth *t, const float (*found)[3], size_t ground, b
     return count ? 100 * sqrt(sum / (double)count) / (mean / (double)count) : 0;
 }
 
+// Transport is for what is rigid, the full field for one occluder under skies.
+static bool applies(int way, const alb_scene *scene)
+{
+    return (ways[way].kind != TRANSPORT || scene->objects[scene->object_count - 1].rigid) &&
+           (ways[way].kind != FULL || scene->light_count);
+}
+
+// The stage lit in any case: normals and skies are its own.
+static bool light_full(double *frame_s, shadow_full *full, alb_shadow_stage *stage, const alb_scene *scene,
+                       alb_error *error)
+{
+    const alb_object *object = &scene->objects[1];
+    const alb_vector *vertices = scene->mesh.vertices;
+    alb_mesh mesh = {0};
+    bool ok = full->shells[0].samples ||
+              (shadow_full_mesh(&mesh, scene, object, error) && shadow_full_create(full, &mesh, error));
+    alb_mesh_free(&mesh);
+    const double start_s = now_s();
+    ok = ok && shadow_full_sample(full, vertices + object->first_vertex, error);
+    if (ok)
+        shadow_full_light(stage->irradiance, full, stage->skies, &stage->laws.sky, vertices, stage->normals,
+                          scene->mesh.vertex_count);
+    *frame_s = now_s() - start_s;
+    return ok;
+}
+
+static bool check_frame(double error_percent[2], const alb_shadow_stage *stage, const alb_scene *scene,
+                        alb_error *error)
+{
+    static truth t;
+    static float found[SAMPLES][3];
+    const bool ok = find_truth(&t, stage, scene, error);
+    for (size_t i = 0; ok && i < t.count; i++)
+        memcpy(found[i], stage->irradiance[t.vertices[i]], sizeof found[i]);
+    for (int k = 0; ok && k < 2; k++)
+        error_percent[k] =
+            fmax(error_percent[k], error_of(&t, (const float(*)[3])found, scene->objects[0].vertex_count, k == 1));
+    free_truth(&t);
+    return ok;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const double difference = *(const double *)a - *(const double *)b;
+    return (difference > 0) - (difference < 0);
+}
+
 static bool run_way(result *out, int scene_index, int way, int frames, alb_error *error)
 {
     const shadow_scene *which = &shadow_scenes[scene_index];
     alb_shadow_stage stage = stage_of(way);
-    double *times = calloc((size_t)frames, sizeof *times);
-    bool ok = times != NULL;
+    shadow_full full = {0};
+    double *times = calloc((size_t)frames + 1, sizeof *times); // the first makes the tables and fields
+    bool ok = times != NULL, apply = true;
     *out = (result){0};
-    for (int n = -1; ok && n < frames; n++) {
+    for (int n = 0; ok && apply && n <= frames; n++) {
         alb_scene scene;
-        const int frame = (n + 1) * which->frames / (frames + 1);
-        if (!create_scene(&scene, scene_index, frame, way, error)) {
+        if (!create_scene(&scene, scene_index, n * which->frames / (frames + 1), way, error)) {
             ok = false;
             break;
         }
-        if (ways[way].transport && !has_rigid(&scene)) { // it has none
-            alb_scene_free(&scene);
-            break;
-        }
+        apply = applies(way, &scene);
         const double start_s = now_s();
-        ok = alb_shadow_stage_light(&stage, &scene, error);
-        if (n >= 0) { // the first makes the tables and fields
-            times[n] = now_s() - start_s;
+        ok = !apply || alb_shadow_stage_light(&stage, &scene, error);
+        times[n] = now_s() - start_s;
+        if (ok && apply && ways[way].kind == FULL)
+            ok = light_full(&times[n], &full, &stage, &scene, error);
+        if (ok && n && apply) {
             const double share = times[n] / (stage.sampling_s + stage.light_s) * 1e3 / frames;
             const double light = stage.light_s / (stage.seconds.scaling + stage.seconds.products);
             out->sampling_ms += share * stage.sampling_s;
             out->scaling_ms += share * light * stage.seconds.scaling;
             out->products_ms += share * light * stage.seconds.products;
-        } else if (ok && ways[way].regressed)
+        } else if (ok && apply && ways[way].kind == REGRESSED)
             ok = take_regressed(&stage, error);
-        if (ok && n >= 0 && n % ((frames + CHECKED - 1) / CHECKED) == 0) {
-            static truth t;
-            static float found[SAMPLES][3];
-            ok = find_truth(&t, &stage, &scene, error);
-            for (size_t i = 0; ok && i < t.count; i++)
-                memcpy(found[i], stage.irradiance[t.vertices[i]], sizeof found[i]);
-            const size_t ground = scene.objects[0].vertex_count;
-            for (int k = 0; k < 2; k++)
-                out->error_percent[k] =
-                    fmax(out->error_percent[k], error_of(&t, (const float(*)[3])found, ground, k == 1));
-            free_truth(&t);
-        }
+        if (ok && apply && n && (n - 1) % ((frames + CHECKED - 1) / CHECKED) == 0)
+            ok = check_frame(out->error_percent, &stage, &scene, error);
         alb_scene_free(&scene);
     }
-    for (int i = 0; ok && i < frames; i++) // the median
-        for (int k = i + 1; k < frames; k++)
-            if (times[k] < times[i]) {
-                const double swap = times[i];
-                times[i] = times[k], times[k] = swap;
-            }
-    out->ms = ok ? 1e3 * times[frames / 2] : 0;
+    if (ok && apply) {
+        qsort(times + 1, (size_t)frames, sizeof *times, by_size);
+        out->ms = 1e3 * times[1 + frames / 2]; // the median
+    }
     free(times);
+    shadow_full_free(&full);
     alb_shadow_stage_free(&stage);
     return ok;
 }
@@ -264,8 +298,8 @@ typedef struct figures {
 
 static bool chart(const char *path, const figures *f, alb_error *error)
 {
-    static const char *const colours[WAYS] = {"#d62728", "#1f77b4", "#17becf", "#9467bd",
-                                              "#2ca02c", "#8c564b", "#e377c2", "#000"};
+    static const char *const colours[WAYS] = {"#d62728", "#1f77b4", "#17becf", "#9467bd", "#2ca02c",
+                                              "#8c564b", "#e377c2", "#000",    "#ff7f0e"};
     static double shade_x[SHADOW_SCENES][2 * SHADE], shade_y[SHADOW_SCENES][2 * SHADE], twice[SHADOW_SCENES][WAYS][2];
     alb_curve curves[SHADOW_SCENES][WAYS + 3];
     alb_panel panels[SHADOW_SCENES];
