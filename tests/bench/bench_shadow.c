@@ -7,20 +7,18 @@
 // the irradiance over 2000 vertices (not of lights, not inside others) against 4096 rays each, in percent of the mean,
 // worst of three frames. Rays are cast from the same vertices on as many cores; their time is that of every vertex.
 #include "base/plot.h"
-#include "base/random.h"
 #include "render/shadow_picture.h"
-#include "render/shadow_rays.h"
-#include "render/shadow_stage.h"
 #include "render/view.h"
 #include "scenes/shadow_full.h"
 #include "scenes/shadow_scenes.h"
+#include "scenes/shadow_truth.h"
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-enum { SAMPLES = 2000, WAYS = 9, RAYS = 4, CHECKED = 3, SHADE = 160 };
+enum { WAYS = 9, RAYS = 4, CHECKED = 3, SHADE = 160 };
 
 static const struct {
     const char *name;
@@ -42,14 +40,6 @@ static const int strata[RAYS] = {4, 8, 16, 32};
 typedef struct result {
     double ms, sampling_ms, scaling_ms, products_ms, error_percent[2]; // on the ground, on the model
 } result;
-
-typedef struct truth {
-    size_t count, vertices[SAMPLES];
-    alb_vector points[SAMPLES], normals[SAMPLES];
-    float irradiance[SAMPLES][3];
-    alb_tracer tracer;
-    float (*radiance)[3];
-} truth;
 
 static double now_s(void)
 {
@@ -88,72 +78,6 @@ static bool create_scene(alb_scene *scene, int index, int frame, int way, alb_er
     return true;
 }
 
-static bool in_light(const alb_shadow_stage *stage, const alb_scene *scene, size_t vertex)
-{
-    for (size_t i = stage->occluder_count; i < stage->occluder_count + stage->light_count; i++) {
-        const alb_object *o = &scene->objects[stage->objects[i]];
-        if (vertex >= o->first_vertex && vertex - o->first_vertex < o->vertex_count)
-            return true;
-    }
-    return false;
-}
-
-static bool find_truth(truth *t, const alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
-{
-    alb_mesh casters = {0};
-    bool ok = (t->radiance = calloc(scene->mesh.face_count, sizeof *t->radiance)) != NULL;
-    for (size_t v = 0; ok && v < scene->mesh.vertex_count; v++)
-        ok = alb_mesh_add_vertex(&casters, scene->mesh.vertices[v], error);
-    for (size_t f = 0; ok && f < scene->mesh.face_count; f++) {
-        const uint32_t *v = scene->mesh.faces[f];
-        if (v[0] < scene->objects[0].vertex_count) // the ground casts nothing
-            continue;
-        const size_t count = casters.face_count;
-        ok = alb_mesh_add_face(&casters, v[0], v[1], v[2], 0, error);
-        for (int c = 0; c < 3 && casters.face_count > count; c++)
-            t->radiance[count][c] = (float)(scene->surfaces[scene->mesh.groups[f]].exitance[c] / M_PI);
-    }
-    ok = ok && alb_tracer_create(&t->tracer, &casters, error);
-    alb_mesh_free(&casters);
-    alb_random random = alb_random_at(3, 1, 0);
-    for (t->count = 0; ok && t->count < SAMPLES;) {
-        const size_t v = (size_t)(alb_random_uniform(&random) * (double)scene->mesh.vertex_count);
-        if (in_light(stage, scene, v) ||
-            alb_shadow_buried(&t->tracer, scene->mesh.vertices[v], stage->normals[v], 256 * t->tracer.slack_mm))
-            continue;
-        t->vertices[t->count] = v;
-        t->points[t->count] = scene->mesh.vertices[v];
-        t->normals[t->count++] = stage->normals[v];
-    }
-    if (ok)
-        alb_shadow_cast(t->irradiance, &t->tracer, (const float(*)[3])t->radiance, scene->lights, scene->light_count,
-                        t->points, t->normals, t->count, 64, 256 * t->tracer.slack_mm, 1);
-    return ok;
-}
-
-static void free_truth(truth *t)
-{
-    alb_tracer_free(&t->tracer);
-    free(t->radiance);
-}
-
-// On the ground, or on the model.
-static double error_of(const truth *t, const float (*found)[3], size_t ground, bool model)
-{
-    double sum = 0, mean = 0;
-    size_t count = 0;
-    for (size_t n = 0; n < t->count; n++) {
-        if (model == (t->vertices[n] < ground))
-            continue;
-        for (int c = 0; c < 3; c++) {
-            sum += pow((double)(found[n][c] - t->irradiance[n][c]), 2);
-            mean += (double)t->irradiance[n][c];
-        }
-        count += 3;
-    }
-    return count ? 100 * sqrt(sum / (double)count) / (mean / (double)count) : 0;
-}
-
 // Transport is for what is rigid, the full field for one occluder under skies.
 static bool applies(int way, const alb_scene *scene)
 {
@@ -183,15 +107,15 @@ static bool light_full(double *frame_s, shadow_full *full, alb_shadow_stage *sta
 static bool check_frame(double error_percent[2], const alb_shadow_stage *stage, const alb_scene *scene,
                         alb_error *error)
 {
-    static truth t;
-    static float found[SAMPLES][3];
-    const bool ok = find_truth(&t, stage, scene, error);
+    static shadow_truth t;
+    static float found[SHADOW_TRUTH_SAMPLES][3];
+    const bool ok = shadow_truth_find(&t, stage, scene, error);
     for (size_t i = 0; ok && i < t.count; i++)
         memcpy(found[i], stage->irradiance[t.vertices[i]], sizeof found[i]);
     for (int k = 0; ok && k < 2; k++)
-        error_percent[k] =
-            fmax(error_percent[k], error_of(&t, (const float(*)[3])found, scene->objects[0].vertex_count, k == 1));
-    free_truth(&t);
+        error_percent[k] = fmax(
+            error_percent[k], shadow_truth_error(&t, (const float(*)[3])found, scene->objects[0].vertex_count, k == 1));
+    shadow_truth_free(&t);
     return ok;
 }
 
@@ -248,21 +172,21 @@ static bool run_rays(double *ms, double (*percent)[RAYS], int scene_index, alb_e
     const shadow_scene *which = &shadow_scenes[scene_index];
     alb_scene scene;
     alb_shadow_stage stage = stage_of(1);
-    static truth t;
-    static float found[SAMPLES][3];
+    static shadow_truth t;
+    static float found[SHADOW_TRUTH_SAMPLES][3];
     bool ok = create_scene(&scene, scene_index, which->frames / 6, 1, error) &&
-              alb_shadow_stage_light(&stage, &scene, error) && find_truth(&t, &stage, &scene, error);
+              alb_shadow_stage_light(&stage, &scene, error) && shadow_truth_find(&t, &stage, &scene, error);
     for (int k = 0; ok && k < RAYS; k++) {
         const double start_s = now_s();
         alb_shadow_cast(found, &t.tracer, (const float(*)[3])t.radiance, scene.lights, scene.light_count, t.points,
                         t.normals, t.count, strata[k], 256 * t.tracer.slack_mm, 77);
         ms[k] = 1e3 * (now_s() - start_s) * (double)scene.mesh.vertex_count / (double)t.count;
         for (int model = 0; model < 2; model++)
-            percent[model][k] = error_of(&t, (const float(*)[3])found, scene.objects[0].vertex_count, model);
+            percent[model][k] = shadow_truth_error(&t, (const float(*)[3])found, scene.objects[0].vertex_count, model);
         printf("%-8s %4d rays %53.1f %21.2f %10.2f\n", which->name, strata[k] * strata[k], ms[k], percent[0][k],
                percent[1][k]);
     }
-    free_truth(&t);
+    shadow_truth_free(&t);
     alb_shadow_stage_free(&stage);
     alb_scene_free(&scene);
     return ok;
