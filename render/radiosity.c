@@ -4,6 +4,7 @@
 // row sums of S' are its column sums as far as the profile is symmetric: rows below 1 are what a solution needs.
 #include "render/radiosity.h"
 #include "base/memory.h"
+#include "render/radiosity_two_level.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -76,12 +77,6 @@ static void sweep(alb_rgb *x, const void *data, const alb_rgb *right)
             x[p][c] = right[p][c] + equations->scattered[p][c];
 }
 
-static void coarse(alb_rgb *x, const void *data, const alb_rgb *right)
-{
-    const alb_radiosity *equations = data;
-    alb_clusters_solve(x, &equations->clusters, right);
-}
-
 alb_bounce alb_radiosity_bounce(alb_radiosity *equations)
 {
     return (alb_bounce){.count = equations->factors->patch_count,
@@ -89,7 +84,6 @@ alb_bounce alb_radiosity_bounce(alb_radiosity *equations)
                         .data = equations,
                         .apply = apply,
                         .sweep = sweep,
-                        .coarse = coarse,
                         .even = (const alb_rgb *)equations->scatter->row_sums};
 }
 
@@ -99,6 +93,8 @@ bool alb_radiosity_solve(alb_rgb *radiosity, alb_radiosity_report *report, alb_r
 {
     const size_t n = equations->factors->patch_count;
     const alb_bounce bounce = alb_radiosity_bounce(equations);
+    if (solver == ALB_SOLVER_TWO_LEVEL)
+        return alb_two_level_run(radiosity, report, equations, irradiance, exitance, start, residual, error);
     alb_rgb *right = alb_allocate(n, sizeof *right, error);
     if (!right)
         return false;

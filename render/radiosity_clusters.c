@@ -1,10 +1,10 @@
-// The coarse level: irradiance even on each cluster, scattering local (all that light spreads inside a body stays
-// within its cluster). A cluster holds 16 patches, or fewer where its patches see few others: in a gap narrower than a
-// patch light goes from patch to patch, stays for long, and clusters would hold it back. With s the row sums of S', Q
-// the area mean over a cluster and P its transpose,
-//     x = v + s P g,    g = F_c (Q v + s_c g)
-// F_c takes 256 of the rays of a cluster's patches, by a lattice over area and over the sorted row of each patch. The
-// coarse solution is a guess that GMRES corrects: what it gets wrong costs products, not accuracy.
+// The coarse level: irradiance even on each cluster. A cluster holds 16 patches, or fewer where its patches see few
+// others: in a gap narrower than a patch light goes from patch to patch, stays for long, and clusters would hold it
+// back. Q is the mean over a cluster's area; what falls on the clusters of what they send out, b, is
+//     g = (I - F_c S_c)^-1 F_c b
+// F_c takes 256 of the rays of a cluster's patches, by a lattice over area and over the sorted row of each patch; S_c
+// the row sum of S' times the mean over 48 sources a channel, drawn from the rows of S' likewise. The coarse solution
+// is a guess that the solver corrects: what it gets wrong costs products, not accuracy.
 #include "render/radiosity_clusters.h"
 #include "base/memory.h"
 #include "base/vector_clones.h"
@@ -147,6 +147,51 @@ static void fill(alb_clusters *out, const placed *sorted, const alb_form_factors
     }
 }
 
+// How many sources each patch has a say in, at equal steps through the area of its cluster's members; as places of the
+// first ones, in the order of the patches.
+static void share_sources(uint32_t *first, const alb_clusters *clusters, const placed *sorted)
+{
+    double before = 0;
+    for (size_t k = 0; k < clusters->patch_count; k++) {
+        const uint32_t patch = sorted[k].patch;
+        const uint16_t which = clusters->cluster[patch];
+        const double scale = ALB_CLUSTER_SOURCES / clusters->areas_mm2[which];
+        if (!k || clusters->cluster[sorted[k - 1].patch] != which)
+            before = 0;
+        const double after = before + clusters->patch_areas_mm2[patch];
+        const bool last = k + 1 == clusters->patch_count || clusters->cluster[sorted[k + 1].patch] != which;
+        first[patch + 1] =
+            (last ? ALB_CLUSTER_SOURCES : (uint32_t)(after * scale + 0.5)) - (uint32_t)(before * scale + 0.5);
+        before = after;
+    }
+    for (size_t p = 0; p < clusters->patch_count; p++)
+        first[p + 1] += first[p];
+}
+
+static bool take_sources(alb_clusters *clusters, const placed *sorted, const alb_scatter *scatter, alb_error *error)
+{
+    const size_t n = clusters->patch_count, count = clusters->count * ALB_CLUSTER_SOURCES;
+    uint32_t *first = alb_allocate(n + 1, sizeof *first, error),
+             *patches = first ? alb_allocate(count, sizeof *patches, error) : NULL;
+    bool ok = patches != NULL;
+    if (ok)
+        share_sources(first, clusters, sorted);
+    for (int c = 0; ok && c < 3; c++) {
+        uint16_t *out = clusters->sources[c] = alb_allocate(count, sizeof *out, error);
+        ok = out && alb_scatter_sample(patches, scatter, first, c, error);
+        for (size_t k = 0; ok && k < n; k++) {
+            const uint16_t which = clusters->cluster[sorted[k].patch];
+            for (uint32_t q = first[sorted[k].patch]; q < first[sorted[k].patch + 1]; q++) {
+                *out = clusters->cluster[patches[q]];
+                clusters->spreads[which] |= *out++ != which;
+            }
+        }
+    }
+    free(first);
+    free(patches);
+    return ok;
+}
+
 bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, const alb_form_factors *factors,
                          const alb_scatter *scatter, uint32_t *row, alb_error *error)
 {
@@ -163,13 +208,16 @@ bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, con
              (clusters->hits = alb_allocate(count * ALB_CLUSTER_RAYS, sizeof *clusters->hits, error)) &&
              (clusters->kept = alb_allocate(count, sizeof *clusters->kept, error)) &&
              (clusters->values = alb_allocate(count + 1, sizeof *clusters->values, error)) &&
+             (clusters->spreads = alb_allocate(count, sizeof *clusters->spreads, error)) &&
              (clusters->right = alb_allocate(count, sizeof *clusters->right, error)) &&
-             (clusters->found = alb_allocate(count, sizeof *clusters->found, error));
+             (clusters->bounced = alb_allocate(count, sizeof *clusters->bounced, error));
     }
     if (ok) {
         fill(clusters, sorted, factors, row);
         alb_clusters_refresh(clusters, scatter);
-    } else
+        ok = take_sources(clusters, sorted, scatter, error);
+    }
+    if (!ok)
         alb_clusters_free(clusters);
     free(sorted);
     return ok;
@@ -182,20 +230,23 @@ void alb_clusters_free(alb_clusters *clusters)
     free(clusters->hits);
     free(clusters->kept);
     free(clusters->values);
+    for (int c = 0; c < 3; c++)
+        free(clusters->sources[c]);
+    free(clusters->spreads);
     free(clusters->right);
-    free(clusters->found);
+    free(clusters->bounced);
     *clusters = (alb_clusters){0};
 }
 
 size_t alb_clusters_bytes(const alb_clusters *clusters)
 {
     return clusters->patch_count * sizeof *clusters->cluster +
-           clusters->count * (ALB_CLUSTER_RAYS * sizeof *clusters->hits + sizeof(double) + 3 * sizeof(alb_rgb) +
-                              sizeof *clusters->values);
+           clusters->count *
+               (ALB_CLUSTER_RAYS * sizeof *clusters->hits + 3 * ALB_CLUSTER_SOURCES * sizeof *clusters->sources[0] +
+                sizeof *clusters->spreads + sizeof(double) + 3 * sizeof(alb_rgb) + sizeof *clusters->values);
 }
 
-// out = Q values
-static void average(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *values)
+void alb_clusters_average(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *values)
 {
     memset(out, 0, clusters->count * sizeof *out);
     for (size_t p = 0; p < clusters->patch_count; p++)
@@ -209,14 +260,22 @@ static void average(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *v
 void alb_clusters_refresh(alb_clusters *clusters, const alb_scatter *scatter)
 {
     clusters->sums = (const alb_rgb *)scatter->row_sums;
-    average(clusters->kept, clusters, clusters->sums);
+    alb_clusters_average(clusters->kept, clusters, clusters->sums);
 }
 
-// out = F_c values
+static void take_values(const alb_clusters *clusters, const alb_rgb *from)
+{
+    for (size_t k = 0; k < clusters->count; k++)
+        for (int c = 0; c < 3; c++)
+            clusters->values[k][c] = (float)from[k][c];
+}
+
+// out = F_c radiosity
 ALB_VECTOR_CLONES
-static void gather(alb_rgb *out, const alb_clusters *clusters)
+static void gather(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity)
 {
     typedef float float4 __attribute__((vector_size(16)));
+    take_values(clusters, radiosity);
 #pragma omp parallel for schedule(static) if (clusters->count > 256)
     for (size_t k = 0; k < clusters->count; k++) {
         const uint16_t *hits = clusters->hits + k * ALB_CLUSTER_RAYS;
@@ -230,31 +289,35 @@ static void gather(alb_rgb *out, const alb_clusters *clusters)
     }
 }
 
-// out = F_c s_c x
+void alb_clusters_scatter(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *light)
+{
+    take_values(clusters, light);
+#pragma omp parallel for schedule(static) if (clusters->count > 256)
+    for (size_t k = 0; k < clusters->count; k++)
+        for (int c = 0; c < 3; c++) {
+            const uint16_t *sources = clusters->sources[c] + k * ALB_CLUSTER_SOURCES;
+            float sum = 0;
+            for (int q = 0; clusters->spreads[k] && q < ALB_CLUSTER_SOURCES; q++)
+                sum += clusters->values[sources[q]][c];
+            out[k][c] = clusters->kept[k][c] * (clusters->spreads[k] ? (double)sum / ALB_CLUSTER_SOURCES : light[k][c]);
+        }
+}
+
+// out = F_c S_c x
 static void bounce(alb_rgb *out, const void *data, const alb_rgb *x)
 {
     const alb_clusters *clusters = data;
-    for (size_t k = 0; k < clusters->count; k++)
-        for (int c = 0; c < 3; c++)
-            clusters->values[k][c] = (float)(clusters->kept[k][c] * x[k][c]);
-    gather(out, clusters);
+    alb_clusters_scatter(clusters->bounced, clusters, x);
+    gather(out, clusters, (const alb_rgb *)clusters->bounced);
 }
 
-void alb_clusters_solve(alb_rgb *x, const alb_clusters *clusters, const alb_rgb *right)
+void alb_clusters_settle(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity)
 {
     alb_radiosity_report report;
     const alb_bounce coarse = {
         .count = clusters->count, .areas_mm2 = clusters->areas_mm2, .data = clusters, .apply = bounce};
-    average(clusters->found, clusters, right);
-    for (size_t k = 0; k < clusters->count; k++)
-        for (int c = 0; c < 3; c++)
-            clusters->values[k][c] = (float)clusters->found[k][c];
-    gather(clusters->right, clusters);
-    if (!alb_solver_run(clusters->found, &report, ALB_SOLVER_GMRES, &coarse, (const alb_rgb *)clusters->right, NULL,
+    gather(clusters->right, clusters, radiosity);
+    if (!alb_solver_run(out, &report, ALB_SOLVER_GMRES, &coarse, (const alb_rgb *)clusters->right, NULL,
                         coarse_residual, NULL))
-        memset(clusters->found, 0, clusters->count * sizeof *clusters->found); // no memory: as without this level
-#pragma omp parallel for schedule(static) if (clusters->patch_count > 8192)
-    for (size_t p = 0; p < clusters->patch_count; p++)
-        for (int c = 0; c < 3; c++)
-            x[p][c] = right[p][c] + clusters->sums[p][c] * clusters->found[clusters->cluster[p]][c];
+        memset(out, 0, clusters->count * sizeof *out); // no memory: as without this level
 }

@@ -9,22 +9,28 @@ typedef struct alb_clusters {
     uint16_t *cluster;             // of each patch
     double *areas_mm2;             // of each cluster
     uint16_t *hits;                // [cluster * ALB_CLUSTER_RAYS + q]: cluster; `count` for the sky and backs
+    uint16_t *sources[3];          // [channel][cluster * ALB_CLUSTER_SOURCES + q]: whose light leaves from here
+    bool *spreads;                 // of each cluster: light from others leaves from here
     alb_rgb *kept;                 // area mean of the row sums of S'
     const alb_rgb *sums;           // row sums of S'; borrowed
     const double *patch_areas_mm2; // borrowed
-    float (*values)[4];            // scratch of a coarse product; the last is zero
-    alb_rgb *right, *found;        // scratch of a coarse solution
+    float (*values)[4];            // scratch of a product; the last is zero
+    alb_rgb *bounced, *right;      // scratch of a solution
 } alb_clusters;
 
-enum { ALB_CLUSTER_RAYS = 256 };
+enum { ALB_CLUSTER_RAYS = 256, ALB_CLUSTER_SOURCES = 48 };
 
 // About 16 patches each, fewer in narrow gaps, of one material and one main direction. row: scratch for the longest row
 // of the factors.
 bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, const alb_form_factors *factors,
                          const alb_scatter *scatter, uint32_t *row, alb_error *error);
 void alb_clusters_free(alb_clusters *clusters);
-// After the scattering was rewritten.
+// After the scattering was rewritten: its sums, which share comes from where stays.
 void alb_clusters_refresh(alb_clusters *clusters, const alb_scatter *scatter);
 size_t alb_clusters_bytes(const alb_clusters *clusters);
-// x = about (I - S'F)^-1 right.
-void alb_clusters_solve(alb_rgb *x, const alb_clusters *clusters, const alb_rgb *right);
+// out = Q values: the mean over area of each cluster's patches.
+void alb_clusters_average(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *values);
+// out = S_c light: what clusters send out of irradiance even on each.
+void alb_clusters_scatter(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *light);
+// out = (I - F_c S_c)^-1 F_c radiosity: irradiance of the clusters by each other, for what they send out by themselves.
+void alb_clusters_settle(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity);

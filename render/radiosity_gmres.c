@@ -1,6 +1,6 @@
-// Restarted, flexible GMRES (Saad & Schultz 1986; Saad 1993) on x = b + K x, the three channels in step: one product
-// serves all, each has its own small least-squares problem. Per step, with z_k = v_k or the coarse solution of it,
-//     (K - I) z_k = sum_{i <= k+1} h_ik v_i,      x + sum y_k z_k with y the least |r + (K - I) sum y_k z_k|
+// Restarted GMRES (Saad & Schultz 1986) on x = b + K x, the three channels in step: one product serves all, each has
+// its own small least-squares problem. Per step
+//     (K - I) v_k = sum_{i <= k+1} h_ik v_i,      x + sum y_k v_k with y the least |r + (K - I) sum y_k v_k|
 // The v are orthonormal in the inner product weighted by area; classical Gram-Schmidt, again where it cancels (Kahan's
 // criterion), so that all inner products of a step are one pass over memory.
 #include "base/memory.h"
@@ -12,7 +12,7 @@
 enum { RESTART = 20 };
 
 typedef struct krylov {
-    alb_rgb *v[RESTART + 1], *z[RESTART]; // z: v itself without a coarse level
+    alb_rgb *v[RESTART + 1];
     double hessenberg[3][RESTART + 1][RESTART], cosine[3][RESTART], sine[3][RESTART], rhs[3][RESTART + 1];
 } krylov;
 
@@ -79,10 +79,8 @@ static void extend(alb_run *run, krylov *s, int k)
     const alb_bounce *bounce = run->bounce;
     alb_rgb *next = s->v[k + 1];
     double length[3], left[3];
-    if (s->z[k] != s->v[k])
-        bounce->coarse(s->z[k], bounce->data, (const alb_rgb *)s->v[k]);
-    bounce->apply(next, bounce->data, (const alb_rgb *)s->z[k]);
-    alb_space_add(NULL, &run->space, next, minus_one, &s->z[k], 1);
+    bounce->apply(next, bounce->data, (const alb_rgb *)s->v[k]);
+    alb_space_add(NULL, &run->space, next, minus_one, &s->v[k], 1);
     for (int c = 0; c < 3; c++)
         for (int i = 0; i <= k; i++)
             s->hessenberg[c][i][k] = 0;
@@ -96,7 +94,7 @@ static void extend(alb_run *run, krylov *s, int k)
     alb_run_note(run, alb_run_worst(run, left));
 }
 
-// x += sum_k y_k z_k with the triangular system solved per channel.
+// x += sum_k y_k v_k with the triangular system solved per channel.
 static void update(alb_run *run, const krylov *s, int steps)
 {
     double y[RESTART][3] = {{0}};
@@ -108,10 +106,10 @@ static void update(alb_run *run, const krylov *s, int steps)
             const double pivot = s->hessenberg[c][k][k];
             y[k][c] = pivot != 0 ? rest / pivot : 0;
         }
-    alb_space_add(NULL, &run->space, run->x, (const double(*)[3])y, s->z, steps);
+    alb_space_add(NULL, &run->space, run->x, (const double(*)[3])y, s->v, steps);
 }
 
-// r + (K - I) sum y_k z_k in the basis, which is what the rotations left over, turned back: the residual without a
+// r + (K - I) sum y_k v_k in the basis, which is what the rotations left over, turned back: the residual without a
 // product.
 static void take_residual(alb_run *run, const krylov *s, int steps)
 {
@@ -141,7 +139,7 @@ static void restart(alb_run *run, krylov *s)
         s->rhs[c][0] = -length[c];
 }
 
-static bool run_with(alb_run *run, bool coarse, alb_error *error)
+bool alb_run_gmres(alb_run *run, alb_error *error)
 {
     const size_t n = run->space.count;
     alb_radiosity_report *report = run->report;
@@ -151,9 +149,6 @@ static bool run_with(alb_run *run, bool coarse, alb_error *error)
         return false;
     for (int k = 0; k <= RESTART; k++)
         if (!(s->v[k] = alb_allocate(n, sizeof(alb_rgb), error)))
-            goto done;
-    for (int k = 0; k < RESTART; k++)
-        if (!(s->z[k] = coarse ? alb_allocate(n, sizeof(alb_rgb), error) : s->v[k]))
             goto done;
     while (!over) {
         int steps = 0;
@@ -171,20 +166,8 @@ static bool run_with(alb_run *run, bool coarse, alb_error *error)
     }
     ok = true;
 done:
-    for (int k = 0; k < RESTART; k++)
-        if (s->z[k] != s->v[k])
-            free(s->z[k]);
     for (int k = 0; k <= RESTART; k++)
         free(s->v[k]);
     free(s);
     return ok;
-}
-
-bool alb_run_gmres(alb_run *run, alb_error *error) { return run_with(run, false, error); }
-
-bool alb_run_two_level(alb_run *run, alb_error *error)
-{
-    if (!run->bounce->coarse)
-        return alb_fail(error, ALB_USAGE, "two_level needs a coarse level, and has none");
-    return run_with(run, true, error);
 }

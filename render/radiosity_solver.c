@@ -121,8 +121,14 @@ done:
     return ok;
 }
 
+static bool two_level(alb_run *run, alb_error *error)
+{
+    (void)run;
+    return alb_fail(error, ALB_USAGE, "two_level needs scattering and form factors apart, and has their product alone");
+}
+
 static bool (*const solvers[ALB_SOLVERS])(alb_run *, alb_error *) = {jacobi, gauss_seidel, energy_corrected,
-                                                                     alb_run_gmres, alb_run_two_level};
+                                                                     alb_run_gmres, two_level};
 
 // Takes the guess where it helps: the multiple of it with the smallest residual, for each channel.
 static bool take_start(alb_run *run, const alb_rgb *start, alb_error *error)
@@ -148,6 +154,14 @@ static bool take_start(alb_run *run, const alb_rgb *start, alb_error *error)
     return true;
 }
 
+bool alb_solver_check(const alb_radiosity_report *report, alb_solver solver, double residual, double floor,
+                      alb_error *error)
+{
+    return report->residual <= fmax(residual, floor) ||
+           alb_fail(error, ALB_INTERNAL, "radiosity: residual %.3g after %d products of %s, asked for %.3g",
+                    report->residual, report->iterations, alb_solver_names[solver], residual);
+}
+
 bool alb_solver_run(alb_rgb *x, alb_radiosity_report *report, alb_solver solver, const alb_bounce *bounce,
                     const alb_rgb *right, const alb_rgb *start, double residual, alb_error *error)
 {
@@ -168,9 +182,7 @@ bool alb_solver_run(alb_rgb *x, alb_radiosity_report *report, alb_solver solver,
     }
     if (ok && report->iterations)
         add_residual(&run); // the last bounce
-    if (ok && !(report->residual <= fmax(residual, run.floor)))
-        ok = alb_fail(error, ALB_INTERNAL, "radiosity: residual %.3g after %d products of %s, asked for %.3g",
-                      report->residual, report->iterations, alb_solver_names[solver], residual);
+    ok = ok && alb_solver_check(report, solver, residual, run.floor, error);
     alb_space_free(&run.space);
     free(run.residual);
     return ok;

@@ -8,7 +8,7 @@ typedef enum alb_solver {
     ALB_SOLVER_GAUSS_SEIDEL,     // the same with what is new already, patch by patch
     ALB_SOLVER_ENERGY_CORRECTED, // Jacobi, and even light added until the power balances
     ALB_SOLVER_GMRES,            // smallest residual over all bounces so far
-    ALB_SOLVER_TWO_LEVEL,        // GMRES, each direction first solved on clusters of patches
+    ALB_SOLVER_TWO_LEVEL,        // on clusters of patches first: needs S' and F apart (alb_radiosity_solve)
     ALB_SOLVERS
 } alb_solver;
 extern const char *const alb_solver_names[ALB_SOLVERS]; // "jacobi", "gauss_seidel", ...
@@ -25,22 +25,21 @@ typedef struct alb_bounce {
     void (*apply)(alb_rgb *out, const void *data, const alb_rgb *x); // out = K x
     // x = right + K x in place, row by row with the rows already done. NULL: no Gauss-Seidel.
     void (*sweep)(alb_rgb *x, const void *data, const alb_rgb *right);
-    // x = about (I - K)^-1 right, at a small part of the cost of a product. NULL: no two levels.
-    void (*coarse)(alb_rgb *x, const void *data, const alb_rgb *right);
     const alb_rgb *even; // K of even light, or like it: the direction of the energy correction. NULL: ones
 } alb_bounce;
 
 typedef struct alb_radiosity_report {
-    int iterations;                       // products with K
+    int iterations;                       // products with K; two_level: with S', and one more with F at the start
     double residual;                      // |b + K x - x| / |b|, area-weighted 2-norm, worst channel; of the vectors
-                                          // themselves, no estimate. What is returned is b + K x, one bounce better
-    double residual_flux[3];              // mean over area of |b + K x - x|
+                                          // themselves, no estimate. What is returned is b + K x, one bounce better.
+                                          // Two_level: a bound of it, for what is returned (radiosity_two_level.c)
+    double residual_flux[3];              // mean over area of |b + K x - x|; two_level: of |E + F B - (E + h)|
     double history[ALB_PRODUCTS_MAX + 1]; // residual after each product
 } alb_radiosity_report;
 
 // Solves to the relative residual, or as near as rounding lets it come (ALB_RESIDUAL_LEAST). start (may be NULL) is
 // a guess, and costs one product. ALB_INTERNAL with the numbers where ALB_PRODUCTS_MAX products do not reach it;
-// ALB_USAGE where the solver lacks what it needs of the bounce.
+// ALB_USAGE where the solver lacks what it needs of the bounce, as two_level does.
 bool alb_solver_run(alb_rgb *x, alb_radiosity_report *report, alb_solver solver, const alb_bounce *bounce,
                     const alb_rgb *right, const alb_rgb *start, double residual, alb_error *error);
 
@@ -64,4 +63,6 @@ double alb_run_worst(const alb_run *run, const double length[3]);
 // Counts a product and notes the residual after it.
 void alb_run_note(alb_run *run, double residual);
 bool alb_run_gmres(alb_run *run, alb_error *error);
-bool alb_run_two_level(alb_run *run, alb_error *error);
+// ALB_INTERNAL with the numbers where neither the residual asked for nor the floor is reached.
+bool alb_solver_check(const alb_radiosity_report *report, alb_solver solver, double residual, double floor,
+                      alb_error *error);

@@ -51,6 +51,10 @@ bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_
 void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
 // The part of S' irradiance that crossed a slab or a sheet: zero elsewhere. Same rows.
 void alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
+// sources[first[p] .. first[p + 1]): patches whose light leaves from patch p, as often as their share of what even
+// light of the channel sends out there; p itself where it is opaque.
+bool alb_scatter_sample(uint32_t *sources, const alb_scatter *scatter, const uint32_t *first, int channel,
+                        alb_error *error);
 // One line for each way that light goes inside bodies that are not convex: how many are solids, how many sheets, how
 // thick.
 void alb_scatter_note(FILE *out, const char *prefix, const alb_scatter *scatter);

@@ -1,10 +1,9 @@
-// One block's links in runs by kernel, octave and level, nodes as steps of 16 bits; a wider gap is crossed by links of
+// One block's links in runs by kernel, octave and kind, sources as steps of 16 bits; a wider gap is crossed by links of
 // weight zero.
 #include "render/scatter_block.h"
 #include <stdlib.h>
 #include <string.h>
 
-// The items with room for so many more; failed, and as they were, for want of memory.
 void *alb_grow(bool *failed, void *items, size_t *capacity, size_t count, size_t more, size_t size)
 {
     if (*failed || count + more <= *capacity)
@@ -26,7 +25,7 @@ void alb_found_links_free(alb_found_links *found)
     *found = (alb_found_links){0};
 }
 
-// The order of the links by bucket, and in each as found: by node.
+// The order of the links by bucket, and in each as found: by source.
 static void sort_links(alb_found_links *work, uint32_t starts[ALB_BUCKETS + 1])
 {
     uint32_t at[ALB_BUCKETS];
@@ -41,28 +40,29 @@ static void sort_links(alb_found_links *work, uint32_t starts[ALB_BUCKETS + 1])
         work->order[at[work->links[k].bucket]++] = (uint32_t)k;
 }
 
-// Steps of at most 65,535 between the nodes of a bucket: how many, counting those that only fill a gap.
+// Steps of at most 65,535 between the sources of a bucket: how many, counting those that only fill a gap.
 static size_t steps_of(const alb_found_links *work, uint32_t from, uint32_t to)
 {
     size_t steps = to - from;
     for (uint32_t k = from + 1; k < to; k++)
-        steps += (work->links[work->order[k]].node - work->links[work->order[k - 1]].node) / (UINT16_MAX + 1U);
+        steps += (work->links[work->order[k]].source - work->links[work->order[k - 1]].source) / (UINT16_MAX + 1U);
     return steps;
 }
 
 static bool allocate_block(alb_link_block *block, const alb_found_links *work, const uint32_t starts[ALB_BUCKETS + 1])
 {
-    size_t steps = 0, codes = 0;
+    size_t steps = 0, codes = 0, nodes = 0;
     for (int bucket = 0; bucket < ALB_BUCKETS; bucket++)
         if (starts[bucket + 1] > starts[bucket]) {
             const size_t more = steps_of(work, starts[bucket], starts[bucket + 1]);
             block->run_count++;
             steps += more;
-            codes += more * (size_t)alb_levels[bucket % ALB_LEVELS].parts;
+            codes += more * alb_link_code_bytes(bucket % ALB_LINK_KINDS);
+            nodes += bucket % ALB_LINK_KINDS <= ALB_LINK_NEAR_NODE ? more : 0;
         }
     block->pair_count = (uint32_t)work->pair_count;
     block->bytes = block->pair_count * sizeof *block->pairs + block->run_count * sizeof *block->runs +
-                   steps * (sizeof *block->deltas + sizeof *block->directions) + codes * ALB_BLOCK;
+                   steps * sizeof *block->deltas + codes + nodes * sizeof *block->directions;
     if (!(block->pairs = malloc(block->bytes + 1)))
         return false;
     if (work->pair_count)
@@ -71,7 +71,7 @@ static bool allocate_block(alb_link_block *block, const alb_found_links *work, c
     block->runs = (alb_link_run *)(block->pairs + block->pair_count);
     block->deltas = (uint16_t *)(block->runs + block->run_count);
     block->codes = (uint8_t *)(block->deltas + steps);
-    block->directions = (int8_t(*)[4])(block->codes + codes * ALB_BLOCK);
+    block->directions = (int8_t(*)[4])(block->codes + codes);
     return true;
 }
 
@@ -82,31 +82,29 @@ typedef struct cursor {
     int8_t (*directions)[4];
 } cursor;
 
-static void write_step(cursor *at, uint32_t delta, const alb_found_link *next, const uint8_t *codes, size_t size)
+static void write_step(cursor *at, uint32_t delta, const alb_found_link *next, const uint8_t *codes, int kind)
 {
+    const size_t size = alb_link_code_bytes(kind);
     *at->deltas++ = (uint16_t)delta;
-    if (next) {
+    if (next)
         memcpy(at->codes, codes, size);
-        memcpy(*at->directions, next->direction, sizeof next->direction);
-    } else {
+    else
         memset(at->codes, ALB_NO_LINK, size);
-        memset(*at->directions, 0, sizeof *at->directions);
-    }
     at->codes += size;
-    at->directions++;
+    if (kind <= ALB_LINK_NEAR_NODE)
+        memcpy(at->directions++, next ? next->direction : (const int8_t[4]){0}, sizeof *at->directions);
 }
 
 static void write_run(alb_link_run *run, cursor *at, const alb_found_links *work, uint32_t from, uint32_t to)
 {
-    const size_t size = (size_t)(ALB_BLOCK * alb_levels[run->level].parts);
-    run->first = work->links[work->order[from]].node;
-    uint32_t node = run->first;
+    run->first = work->links[work->order[from]].source;
+    uint32_t source = run->first;
     for (uint32_t k = from; k < to; k++) {
         const alb_found_link *next = &work->links[work->order[k]];
-        for (; next->node - node > UINT16_MAX; node += UINT16_MAX)
-            write_step(at, UINT16_MAX, NULL, NULL, size);
-        write_step(at, next->node - node, next, work->codes + next->codes, size);
-        node = next->node;
+        for (; next->source - source > UINT16_MAX; source += UINT16_MAX)
+            write_step(at, UINT16_MAX, NULL, NULL, run->kind);
+        write_step(at, next->source - source, next, work->codes + next->codes, run->kind);
+        source = next->source;
     }
 }
 
@@ -127,11 +125,10 @@ void alb_link_block_write(alb_link_block *block, alb_found_links *work, const ui
         if (from == to)
             continue;
         *run = (alb_link_run){.count = (uint32_t)steps_of(work, from, to),
-                              .kernel = kernels[bucket / (ALB_OCTAVES * ALB_LEVELS)],
-                              .octave = (uint8_t)(bucket / ALB_LEVELS % ALB_OCTAVES),
-                              .level = (uint8_t)(bucket % ALB_LEVELS)};
+                              .kernel = kernels[bucket / (ALB_OCTAVES * ALB_LINK_KINDS)],
+                              .octave = (uint8_t)(bucket / ALB_LINK_KINDS % ALB_OCTAVES),
+                              .kind = (uint8_t)(bucket % ALB_LINK_KINDS)};
         write_run(run++, &at, work, from, to);
     }
-    for (const uint8_t *code = block->codes; code < at.codes; code++)
-        block->link_count += *code != ALB_NO_LINK;
+    block->link_count += work->count * block->row_count;
 }

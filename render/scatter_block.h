@@ -2,16 +2,16 @@
 #pragma once
 #include "render/scatter_links.h"
 
-enum { ALB_OCTAVES = ALB_KERNEL_BINS / 4, ALB_BUCKETS = ALB_SIDES * ALB_OCTAVES * ALB_LEVELS };
+enum { ALB_OCTAVES = ALB_KERNEL_BINS / 4, ALB_BUCKETS = ALB_SIDES * ALB_OCTAVES * ALB_LINK_KINDS };
 
 typedef struct alb_found_link {
-    uint32_t node;
-    uint16_t bucket; // (side, octave, level)
+    uint32_t source; // node or leaf
+    uint16_t bucket; // (side, octave, kind)
     int8_t direction[4];
     size_t codes; // where they begin
 } alb_found_link;
 
-// Of one block, in the order of the nodes. Grown with alb_grow.
+// Of one block, in the order of the sources. Grown with alb_grow.
 typedef struct alb_found_links {
     alb_found_link *links;
     uint32_t *order;

@@ -146,23 +146,32 @@ static void merge(alb_cluster *cluster, const alb_cluster *left, const alb_clust
     cluster->radius_mm = (float)radius;
 }
 
-static void build(const builder *b, uint32_t node, uint32_t first_leaf, uint32_t count)
+// What a product needs of a cluster: of a node, or of a leaf.
+static void keep(alb_forest *forest, const alb_cluster *cluster, alb_scatter_node *node, uint32_t leaf)
 {
-    alb_cluster *cluster = &b->forest->clusters[node];
+    if (node)
+        node->light[3] = cluster->spread_mm2;
+    else
+        forest->lights[leaf][3] = cluster->spread_mm2;
+    for (int k = 0; k < 3; k++)
+        *(node ? &node->moments[k][3] : &forest->centres_mm[leaf][k]) = cluster->centre_mm[k];
+}
+
+static void build(const builder *b, uint32_t index, uint32_t first_leaf, uint32_t count)
+{
+    alb_cluster *cluster = &b->forest->clusters[index];
     if (count == 1) {
         leaf_cluster(cluster, b, first_leaf);
     } else {
         const uint32_t left = alb_left_count(count);
         uint32_t *patches = b->forest->patches + first_leaf;
         part(b, longest_axis(b, patches, count), patches, count, left);
-        build(b, node + 1, first_leaf, left);
-        build(b, node + 2 * left, first_leaf + left, count - left);
+        build(b, index + 1, first_leaf, left);
+        build(b, index + 2 * left, first_leaf + left, count - left);
         merge(cluster, cluster + 1, cluster + 2 * (size_t)left);
     }
     cluster->spread_mm2 = 0.5F * (cluster->moments[0] + cluster->moments[1] + cluster->moments[2]);
-    b->forest->nodes[node].spread_mm2 = cluster->spread_mm2;
-    for (int k = 0; k < 3; k++)
-        b->forest->nodes[node].moments[k][3] = cluster->centre_mm[k];
+    keep(b->forest, cluster, count == 1 ? NULL : &b->forest->nodes[index - first_leaf], first_leaf);
 }
 
 static int face_of(const alb_patches *patches, const alb_optical_paths *paths, alb_vector axis, uint32_t patch)
@@ -187,7 +196,7 @@ static void plant(alb_forest *forest, const alb_body *body, uint32_t index, cons
     }
     for (int face = 0; face < ALB_FACES; face++) {
         alb_tree tree = {.body = index,
-                         .first_node = (uint32_t)forest->node_count,
+                         .first_cluster = (uint32_t)forest->cluster_count,
                          .first_leaf = (uint32_t)forest->leaf_count,
                          .surface = surface,
                          .face = (uint8_t)face,
@@ -200,7 +209,7 @@ static void plant(alb_forest *forest, const alb_body *body, uint32_t index, cons
         tree.leaf_count = (uint32_t)forest->leaf_count - tree.first_leaf;
         if (!tree.leaf_count)
             continue;
-        forest->node_count += 2 * (size_t)tree.leaf_count - 1;
+        forest->cluster_count += 2 * (size_t)tree.leaf_count - 1;
         forest->trees[forest->tree_count++] = tree;
     }
 }
@@ -216,7 +225,9 @@ bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_p
     if (!(forest->trees = alb_allocate(ALB_FACES * bodies->count, sizeof *forest->trees, error)) ||
         !(forest->patches = alb_allocate(leaves, sizeof *forest->patches, error)) ||
         !(forest->areas_mm2 = alb_allocate(leaves, sizeof *forest->areas_mm2, error)) ||
-        !(forest->nodes = alb_allocate(2 * leaves, sizeof *forest->nodes, error)) ||
+        !(forest->centres_mm = alb_allocate(leaves, sizeof *forest->centres_mm, error)) ||
+        !(forest->lights = alb_allocate(leaves, sizeof *forest->lights, error)) ||
+        !(forest->nodes = alb_allocate(leaves, sizeof *forest->nodes, error)) ||
         !(forest->clusters = alb_allocate(2 * leaves, sizeof *forest->clusters, error))) {
         alb_forest_free(forest);
         return false;
@@ -229,7 +240,7 @@ bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_p
     for (size_t t = 0; t < forest->tree_count; t++) {
         const alb_tree *tree = &forest->trees[t];
         const builder b = {forest, patches, tree->middle_mm};
-        build(&b, tree->first_node, tree->first_leaf, tree->leaf_count);
+        build(&b, tree->first_cluster, tree->first_leaf, tree->leaf_count);
     }
     for (size_t i = 0; i < forest->leaf_count; i++)
         forest->areas_mm2[i] = (float)patches->areas_mm2[forest->patches[i]];
@@ -241,6 +252,8 @@ void alb_forest_free(alb_forest *forest)
     free(forest->trees);
     free(forest->patches);
     free(forest->areas_mm2);
+    free(forest->centres_mm);
+    free(forest->lights);
     free(forest->nodes);
     free(forest->clusters);
     *forest = (alb_forest){0};
@@ -249,35 +262,46 @@ void alb_forest_free(alb_forest *forest)
 size_t alb_forest_bytes(const alb_forest *forest)
 {
     return forest->tree_count * sizeof *forest->trees +
-           forest->leaf_count * (sizeof *forest->patches + sizeof *forest->areas_mm2) +
-           forest->node_count * (sizeof *forest->nodes + (forest->clusters ? sizeof *forest->clusters : 0));
+           forest->leaf_count * (sizeof *forest->patches + sizeof *forest->areas_mm2 + sizeof *forest->centres_mm +
+                                 sizeof *forest->lights + sizeof *forest->nodes) +
+           (forest->clusters ? forest->cluster_count * sizeof *forest->clusters : 0);
+}
+
+// Adds what a child sends to its parent: a leaf, all from its centre, or a node.
+static void add_child(alb_scatter_node *sum, const float *light, const float centre[3], const alb_scatter_node *node)
+{
+    for (int c = 0; c < 3; c++)
+        sum->light[c] += light[c];
+    for (int k = 0; k < 3; k++) {
+        const float off = (node ? node->moments[k][3] : centre[k]) - sum->moments[k][3];
+        for (int c = 0; c < 3; c++)
+            sum->moments[k][c] += off * light[c] + (node ? node->moments[k][c] : 0);
+    }
 }
 
 // Sums by halves: rounding grows as the logarithm of the number of leaves.
 static void gather(alb_forest *forest, const double (*irradiance)[3], uint32_t node, uint32_t first_leaf,
                    uint32_t count)
 {
-    alb_scatter_node *sum = &forest->nodes[node];
     if (count == 1) {
         const double area = (double)forest->areas_mm2[first_leaf], *light = irradiance[forest->patches[first_leaf]];
         for (int c = 0; c < 3; c++)
-            sum->light[c] = (float)(area * light[c]);
+            forest->lights[first_leaf][c] = (float)(area * light[c]);
         return;
     }
-    const uint32_t left = alb_left_count(count);
+    const uint32_t left = alb_left_count(count), counts[2] = {left, count - left};
+    const uint32_t nodes[2] = {node + 1, node + left}, leaves[2] = {first_leaf, first_leaf + left};
 #pragma omp task if (count > 8192)
-    gather(forest, irradiance, node + 1, first_leaf, left);
-    gather(forest, irradiance, node + 2 * left, first_leaf + left, count - left);
+    gather(forest, irradiance, nodes[0], leaves[0], counts[0]);
+    gather(forest, irradiance, nodes[1], leaves[1], counts[1]);
 #pragma omp taskwait
-    const alb_scatter_node *const parts[2] = {sum + 1, sum + 2 * (size_t)left};
+    alb_scatter_node *sum = &forest->nodes[node];
     for (int c = 0; c < 3; c++)
-        sum->light[c] = parts[0]->light[c] + parts[1]->light[c];
-    for (int k = 0; k < 3; k++) {
-        const float first = parts[0]->moments[k][3] - sum->moments[k][3],
-                    second = parts[1]->moments[k][3] - sum->moments[k][3];
-        for (int c = 0; c < 3; c++)
-            sum->moments[k][c] = parts[0]->moments[k][c] + first * parts[0]->light[c] + parts[1]->moments[k][c] +
-                                 second * parts[1]->light[c];
+        sum->light[c] = sum->moments[0][c] = sum->moments[1][c] = sum->moments[2][c] = 0;
+    for (int child = 0; child < 2; child++) {
+        const uint32_t leaf = leaves[child];
+        const alb_scatter_node *from = counts[child] > 1 ? &forest->nodes[nodes[child]] : NULL;
+        add_child(sum, from ? from->light : forest->lights[leaf], forest->centres_mm[leaf], from);
     }
 }
 
@@ -288,6 +312,6 @@ void alb_forest_gather(alb_forest *forest, const double (*irradiance)[3])
     for (size_t t = 0; t < forest->tree_count; t++) {
         const alb_tree *tree = &forest->trees[t];
 #pragma omp task if (tree->leaf_count > 256)
-        gather(forest, irradiance, tree->first_node, tree->first_leaf, tree->leaf_count);
+        gather(forest, irradiance, tree->first_cluster - tree->first_leaf, tree->first_leaf, tree->leaf_count);
     }
 }

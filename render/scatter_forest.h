@@ -21,27 +21,30 @@ typedef struct alb_cluster {
 // A cluster as a product sees it. The light, area times irradiance of R, G and B, and its first moments about the
 // centre along x, y and z, in which the last element stays: the centre.
 typedef struct alb_scatter_node {
-    float light[3], spread_mm2;
+    float light[4]; // the last: the spread
     float moments[3][4];
 } alb_scatter_node;
 
 typedef struct alb_tree {
-    uint32_t body, first_node, first_leaf, leaf_count;
+    uint32_t body, first_cluster, first_leaf, leaf_count;
     uint16_t surface;
     uint8_t face;
     float axis[3];        // slab: normal of its faces; of a sheet zero
     alb_vector middle_mm; // of the body
 } alb_tree;
 
-// Nodes of a tree stand in depth-first order. A cluster of n leaves has 2 n - 1 nodes; its children are the next one,
-// with alb_left_count(n) leaves, and the one 2 alb_left_count(n) further on.
+// Clusters of a tree, its patches too, stand in depth-first order. One of n leaves is made of 2 n - 1 clusters; its
+// children are the next one, with alb_left_count(n) leaves, and the one 2 alb_left_count(n) further on. The node of a
+// cluster of several leaves is clusters before it less leaves before it: cluster - first leaf.
 typedef struct alb_forest {
-    size_t tree_count, leaf_count, node_count;
+    size_t tree_count, leaf_count, cluster_count;
     alb_tree *trees;
     uint32_t *patches;       // of the leaves
     float *areas_mm2;        // of the leaves
-    alb_scatter_node *nodes; // workspace of a product
-    alb_cluster *clusters;   // of the nodes; only while links are made
+    float (*centres_mm)[3];  // of the leaves, as those of clusters
+    float (*lights)[4];      // of the leaves: light of R, G and B, and the spread; workspace of a product
+    alb_scatter_node *nodes; // likewise
+    alb_cluster *clusters;   // only while links are made
 } alb_forest;
 
 static inline uint32_t alb_left_count(uint32_t count)
@@ -56,6 +59,6 @@ bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_p
 void alb_forest_free(alb_forest *forest);
 // Covariance of a point of the triangle, in the order of alb_cluster.
 void alb_moments_of_triangle(float moments[6], alb_vector a, alb_vector b, alb_vector c);
-// Fills the nodes from the irradiance of the patches.
+// Fills lights and nodes from the irradiance of the patches.
 void alb_forest_gather(alb_forest *forest, const double (*irradiance)[3]);
 size_t alb_forest_bytes(const alb_forest *forest);

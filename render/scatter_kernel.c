@@ -29,27 +29,28 @@ void alb_scatter_kernel_span(alb_scatter_kernel *kernel, double reach_mm, double
 bool alb_scatter_kernel_create(alb_scatter_kernel *kernel, int first_used, alb_error *error)
 {
     kernel->first_used = first_used;
-    if (!(kernel->storage = alb_allocate((size_t)((kernel->octave_count - first_used) * ALB_CODES + 1),
-                                         sizeof *kernel->values, error)) ||
+    const size_t codes = (size_t)(kernel->octave_count - first_used) * ALB_CODES;
+    if (!(kernel->values = alb_allocate(codes, sizeof *kernel->values, error)) ||
+        !(kernel->bends = alb_allocate(codes, sizeof *kernel->bends, error)) ||
         !(kernel->discs = alb_allocate(ALB_DISC_KNOTS + 1, sizeof *kernel->discs, error))) {
         alb_scatter_kernel_free(kernel);
         return false;
     }
-    const uintptr_t line = 64, at = (uintptr_t)kernel->storage; // an entry is a cache line
-    kernel->values = (float(*)[16])((at + line - 1) / line * line);
     return true;
 }
 
 void alb_scatter_kernel_free(alb_scatter_kernel *kernel)
 {
-    free(kernel->storage);
+    free(kernel->values);
+    free(kernel->bends);
     free(kernel->discs);
     *kernel = (alb_scatter_kernel){0};
 }
 
 size_t alb_scatter_kernel_bytes(const alb_scatter_kernel *kernel)
 {
-    return (size_t)(kernel->octave_count - kernel->first_used) * ALB_CODES * sizeof *kernel->values +
+    return (size_t)(kernel->octave_count - kernel->first_used) * ALB_CODES *
+               (sizeof *kernel->values + sizeof *kernel->bends) +
            (kernel->discs ? (ALB_DISC_KNOTS + 1) * sizeof *kernel->discs : 0);
 }
 
@@ -59,10 +60,12 @@ static double finite_value(const alb_profile *profile, double r_mm, double step_
     return isfinite(s) ? s : alb_profile_ring(profile, 0, 0.5 * step_mm);
 }
 
-static void write_octave(float (*values)[16], const alb_profile profiles[3], double end_mm, double spread_mm2)
+static void write_octave(float (*values)[4], float (*bends)[8], const alb_profile profiles[3], double end_mm,
+                         double spread_mm2)
 {
     const double step = end_mm / (ALB_CODES - 2);
     memset(values, 0, ALB_CODES * sizeof *values);
+    memset(bends, 0, ALB_CODES * sizeof *bends);
     for (int c = 0; c < 3; c++) {
         double s[ALB_CODES];
         for (int q = 0; q < ALB_CODES; q++)
@@ -71,8 +74,10 @@ static void write_octave(float (*values)[16], const alb_profile profiles[3], dou
             const int at = q ? q : 1;
             const double bend = 0.5 * (s[at - 1] - 2 * s[at] + s[at + 1]) / (step * step);
             values[q][c] = (float)s[q];
-            values[q][4 + c] = q ? (float)((s[q + 1] - s[q - 1]) / (2 * step)) : 0;
-            values[q][8 + c] = (float)fmin(fmax(bend, -0.5 * s[q] / spread_mm2), 4 * s[q] / spread_mm2);
+            if (!(s[q] > 0))
+                continue;
+            bends[q][c] = q ? (float)((s[q + 1] - s[q - 1]) / (2 * step * s[q])) : 0;
+            bends[q][4 + c] = (float)fmin(fmax(bend / s[q], -0.5 / spread_mm2), 4 / spread_mm2);
         }
     }
 }
@@ -81,8 +86,9 @@ void alb_scatter_kernel_write(alb_scatter_kernel *kernel, const alb_profile prof
 {
 #pragma omp parallel for schedule(dynamic, 1)
     for (int k = kernel->first_used; k < kernel->octave_count; k++)
-        write_octave(kernel->values + (k - kernel->first_used) * ALB_CODES, profiles,
-                     ldexp(1, kernel->first_octave + k), (double)kernel->largest_spread_mm2);
+        write_octave(kernel->values + (k - kernel->first_used) * ALB_CODES,
+                     kernel->bends + (k - kernel->first_used) * ALB_CODES, profiles, ldexp(1, kernel->first_octave + k),
+                     (double)kernel->largest_spread_mm2);
 #pragma omp parallel for schedule(static)
     for (int k = 0; k <= ALB_DISC_KNOTS; k++) {
         const double u = fmax(k, 1e-3) / ALB_DISC_KNOTS, r = u * u * kernel->near_mm;
@@ -102,6 +108,7 @@ void alb_scatter_kernel_needs_find(alb_scatter_kernel_needs *needs, const alb_sc
     *needs = (alb_scatter_kernel_needs){.first_octave = kernel->first_octave};
     for (int bin = 0; bin < ALB_KERNEL_BINS; bin++)
         needs->size2_mm2[bin] = INFINITY;
+    double firsts[ALB_KERNEL_BINS] = {0}, seconds[ALB_KERNEL_BINS] = {0};
     for (int c = 0; c < 3; c++) {
         const double total = alb_profile_total(&profiles[c]);
         double bends[ALB_KERNEL_BINS], all = 0, most = 0;
@@ -116,8 +123,12 @@ void alb_scatter_kernel_needs_find(alb_scatter_kernel_needs *needs, const alb_sc
             all += M_PI * (next * next - r * r) * bends[bin];
             needs->shares[bin][c] = (float)(s / total);
             needs->slopes[bin][c] = (float)(s > 0 ? slope / s : 0);
+            firsts[bin] += (after - before) / (2 * h * total);
+            seconds[bin] += (before - 2 * s + after) / (h * h * total);
         }
         for (int bin = 0; bin < ALB_KERNEL_BINS; bin++)
             needs->size2_mm2[bin] = fminf(needs->size2_mm2[bin], (float)(all / (links * bends[bin])));
     }
+    for (int bin = 0; bin < ALB_KERNEL_BINS; bin++)
+        needs->leans[bin] = firsts[bin] != 0 ? (float)(0.5 * seconds[bin] / firsts[bin]) : 0;
 }

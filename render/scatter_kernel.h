@@ -15,9 +15,8 @@ typedef struct alb_scatter_kernel {
     alb_side side;
     int first_octave, octave_count, first_used; // tables begin at first_used
     float largest_spread_mm2;                   // of a patch
-    // [octave - first_used][code]: s(d) of R, G, B and a zero, then s'(d), s''(d) / 2 and nothing likewise
-    float (*values)[16];
-    void *storage;
+    // [octave - first_used][code], of R, G, B and a zero: s(d), and then s' / s and s'' / 2 s
+    float (*values)[4], (*bends)[8];
     // P(r) / r of R, G, B, P(r) = integral_0^r s r dr, at r = (knot / ALB_DISC_KNOTS)^2 near_mm
     double near_mm;
     float (*discs)[4];
@@ -29,6 +28,7 @@ typedef struct alb_scatter_kernel_needs {
     float size2_mm2[ALB_KERNEL_BINS]; // squared size that a cluster may have at this distance and further out
     float shares[ALB_KERNEL_BINS][3]; // s / total, 1/mm^2
     float slopes[ALB_KERNEL_BINS][3]; // |s'| / s, 1/mm
+    float leans[ALB_KERNEL_BINS];     // s'' / 2 s', 1/mm, of the channels' sum, each over its total
 } alb_scatter_kernel_needs;
 
 // For distances up to reach_mm, in exact rules up to near_mm.

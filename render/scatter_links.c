@@ -1,11 +1,13 @@
 // Choice of links. Exit patches go in blocks of eight neighbours that share the list of clusters and have each their
 // own distances. For a block of radius R_b, a cluster at distance d, of radius R and squared size 12 spread:
-//     it is taken where   R <= (d - R_b) / 2   and   size^2 <= what the kernel allows at d - R_b - R / 2
+//     it is taken where   R <= 0.65 (d - R_b)   and   size^2 <= what the kernel allows at d - R_b - R / 2
 // and opened elsewhere. Between the faces of a slab d is lateral and the first condition, which keeps a patch out of
 // the clusters that light it, falls away.
 //
-// A patch is taken whole or in 4, 16 or (long ones) 64 equal triangles: the least that leave (scatter_parts.c), of a
-// row's sum, no more than 0.15 of the error wanted; where the smallest leave four times that, exactly (scatter_rule.c).
+// A patch is taken whole or as 4, 16 or (long ones) 64 equal triangles: the least that leave (scatter_parts.c), of a
+// row's sum, no more than 0.15 of the error wanted; where the smallest leave sixteen times that, exactly
+// (scatter_rule.c). Of more than one, three distances stay that have the parts' mean, variance and skewness, or eight
+// where these leave too much.
 //
 // The distance that is coded is the mean over the cluster to second order, sqrt(d^2 + variance across the line of
 // sight); what the variance along it adds, the kernel knows (scatter_kernel.c).
@@ -13,6 +15,7 @@
 #include "base/memory.h"
 #include "base/vector_clones.h"
 #include "render/scatter_block.h"
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,9 +23,9 @@ enum { EXACT = -1 };
 
 // A link before its distances are known; left_out: bits of the rows that are the source itself or take it exactly.
 typedef struct wish {
-    uint32_t node;
+    uint32_t cluster, source; // source: node or leaf
     uint8_t side, left_out;
-    int8_t level;
+    int8_t kind;
 } wish;
 
 // How much longer paths are than straight at a distance and beyond; nearer, in proportion.
@@ -71,9 +74,10 @@ static void project_for(float to[3], const viewer *v, uint32_t row)
     project(to, v->axes[0][row], v->axes[1][row], v->axes[2][row]);
 }
 
-// Mean distances from the rows to the source; across: lateral to the axis.
+// Mean distances from the rows to the source, and its variances along the lines of sight; across: lateral to the axis.
 ALB_VECTOR_CLONES
-static void measure(float distances[ALB_BLOCK], const viewer *v, const alb_source *from, bool across)
+static void measure(float distances[ALB_BLOCK], float along_mm2[ALB_BLOCK], const viewer *v, const alb_source *from,
+                    bool across)
 {
     const float *m = from->moments;
     for (int row = 0; row < ALB_BLOCK; row++) {
@@ -90,15 +94,14 @@ static void measure(float distances[ALB_BLOCK], const viewer *v, const alb_sourc
         const float variance = squared > 0 ? along / squared : 0.5F * trace;
         const float sum = squared + trace - variance;
         distances[row] = sqrtf(sum > 0 ? sum : 0);
+        along_mm2[row] = variance;
     }
 }
 
-static void encode(uint8_t codes[ALB_BLOCK], const float distances[ALB_BLOCK], float per_mm)
+static uint8_t encode(float distance, float per_mm)
 {
-    for (int row = 0; row < ALB_BLOCK; row++) {
-        const float at = distances[row] * per_mm + 0.5F;
-        codes[row] = at < ALB_NO_LINK ? (uint8_t)at : ALB_NO_LINK;
-    }
+    const float at = distance * per_mm + 0.5F;
+    return at < ALB_NO_LINK ? (uint8_t)at : ALB_NO_LINK;
 }
 
 static bool is_sheet(const viewer *v) { return v->paths->kind == ALB_OPTICAL_SHEET; }
@@ -128,13 +131,13 @@ static void aim(int8_t direction[4], const viewer *v, const alb_cluster *cluster
     direction[3] = (int8_t)fminf(rintf(64 * along / (squared * cluster->spread_mm2)), INT8_MAX);
 }
 
-static void want(const viewer *v, uint32_t node, int side, int level, unsigned left_out)
+static void want(const viewer *v, wish wished)
 {
     workspace *work = v->work;
     work->wishes =
         alb_grow(&work->found.failed, work->wishes, &work->wish_capacity, work->wish_count, 1, sizeof *work->wishes);
     if (!work->found.failed)
-        work->wishes[work->wish_count++] = (wish){node, (uint8_t)side, (uint8_t)left_out, (int8_t)level};
+        work->wishes[work->wish_count++] = wished;
 }
 
 static float lengthened(float distance, const detour *by)
@@ -142,52 +145,173 @@ static float lengthened(float distance, const detour *by)
     return by->length != 0 ? distance + by->length * fminf(distance / by->at, 1) : distance;
 }
 
-static void add_link(const viewer *v, const wish *wished, int level, const detour detours[ALB_BLOCK])
+// Three distances with the mean, variance and skewness of a distribution whose fourth moment is that of a triangle's
+// points along a line, 12/5: of weights 5, 14 and 5 in 24. In deviations, z = t - u, -5/7 t, t + u.
+static void take_thirds(float distances[3], float mean, float deviation, float skewness)
 {
-    const int side = wished->side;
-    const alb_cluster *cluster = &v->forest->clusters[wished->node];
-    const alb_scatter_kernel *kernel = v->kernels[side];
-    workspace *work = v->work;
+    float t = skewness / 3;
+    for (int step = 0; step < 3; step++) // Newton
+        t -= (3 * t - 1.938776F * t * t * t - skewness) / (3 - 3 * 1.938776F * t * t);
+    const float u = sqrtf(2.4F - 12.0F / 7 * t * t);
+    distances[0] = mean + deviation * (t - u);
+    distances[1] = mean - deviation * 5 / 7 * t;
+    distances[2] = mean + deviation * (t + u);
+}
+
+// Means of eighths of the sorted distances, drawn apart until they have the variance.
+static void take_eighths(float distances[ALB_SHARES_MAX], float *sorted, int count, float mean, float deviation)
+{
+    float second = 0;
+    for (int gap = 13; gap; gap /= 3) // Shell 1959
+        for (int k = gap; k < count; k++)
+            for (int at = k; at >= gap && sorted[at] < sorted[at - gap]; at -= gap) {
+                const float held = sorted[at];
+                sorted[at] = sorted[at - gap], sorted[at - gap] = held;
+            }
+    for (int k = 0; k < ALB_SHARES_MAX; k++) {
+        distances[k] = -mean;
+        for (int at = k * count / ALB_SHARES_MAX; at < (k + 1) * count / ALB_SHARES_MAX; at++)
+            distances[k] += sorted[at] * (float)ALB_SHARES_MAX / (float)count;
+        second += distances[k] * distances[k] / ALB_SHARES_MAX;
+    }
+    for (int k = 0; k < ALB_SHARES_MAX; k++)
+        distances[k] = mean + distances[k] * (second > 0 ? deviation / sqrtf(second) : 1);
+}
+
+// A row's distances from those of the parts, whose own variance is added.
+static void share_out(float distances[ALB_SHARES_MAX], int kind, float *of_parts, int count, float variance_of_part)
+{
+    float mean = 0, second = 0, third = 0;
+    for (int part = 0; part < count; part++)
+        mean += of_parts[part] / (float)count;
+    for (int part = 0; part < count; part++) {
+        const float off = of_parts[part] - mean;
+        second += off * off / (float)count;
+        third += off * off * off / (float)count;
+    }
+    const float deviation = sqrtf(second + variance_of_part);
+    if (kind == ALB_LINK_THIRDS)
+        take_thirds(distances, mean, deviation, fmaxf(fminf(third / (deviation * deviation * deviation), 1), -1));
+    else
+        take_eighths(distances, of_parts, count, mean, deviation);
+}
+
+// A patch is known to the products by the mean of its variances alone. What it has more along the line of sight moves
+// it, as far as that changes s by a quarter.
+static void lean(float distances[ALB_BLOCK], const float along_mm2[ALB_BLOCK], const alb_cluster *cluster,
+                 const alb_scatter_kernel_needs *needs)
+{
+    for (int row = 0; row < ALB_BLOCK; row++) {
+        const int bin = alb_scatter_kernel_bin(needs, distances[row]);
+        const float *slopes = needs->slopes[bin], move = needs->leans[bin] * (along_mm2[row] - cluster->spread_mm2);
+        const float most = 0.25F / fmaxf(fmaxf(slopes[0], slopes[1]), fmaxf(slopes[2], 1 / distances[row]));
+        distances[row] += fmaxf(fminf(move, most), -most);
+    }
+}
+
+// Distances from the rows to the source, as many as the kind has codes.
+static void find_distances(float distances[ALB_SHARES_MAX][ALB_BLOCK], const viewer *v, const wish *wished, int kind)
+{
+    const alb_cluster *cluster = &v->forest->clusters[wished->cluster];
     alb_source parts[ALB_PARTS_MAX];
-    float distances[ALB_PARTS_MAX][ALB_BLOCK], furthest = 0;
-    const int count = alb_levels[level].parts;
-    if (level) {
-        alb_vector t[3];
-        alb_patch_triangle(t, v->patches, v->forest->patches[cluster->leaf]);
-        for (int k = 0; k < 3; k++)
-            t[k] = alb_sub(t[k], v->tree->middle_mm);
-        alb_parts_cut(parts, t, &alb_levels[level]);
-    } else {
+    float of_parts[ALB_PARTS_MAX][ALB_BLOCK], along_mm2[ALB_BLOCK];
+    if (kind <= ALB_LINK_NEAR_PATCH) {
         memcpy(parts[0].at, cluster->centre_mm, sizeof parts[0].at);
         memcpy(parts[0].moments, cluster->moments, sizeof parts[0].moments);
+        measure(distances[0], along_mm2, v, &parts[0], wished->side == ALB_TRANSMISSION);
+        if (kind >= ALB_LINK_PATCH)
+            lean(distances[0], along_mm2, cluster, v->needs[wished->side]);
+        return;
     }
+    alb_vector t[3];
+    alb_patch_triangle(t, v->patches, v->forest->patches[cluster->leaf]);
+    for (int k = 0; k < 3; k++)
+        t[k] = alb_sub(t[k], v->tree->middle_mm);
+    const int count = kind == ALB_LINK_EIGHTHS ? ALB_PARTS_MAX : alb_parts_most(cluster);
+    const float share = alb_parts_cut(parts, cluster, t, count);
+    for (int part = 0; part < count; part++)
+        measure(of_parts[part], along_mm2, v, &parts[part], wished->side == ALB_TRANSMISSION);
+    for (int row = 0; row < ALB_BLOCK; row++) {
+        float of_row[ALB_PARTS_MAX], shares[ALB_SHARES_MAX];
+        for (int part = 0; part < count; part++)
+            of_row[part] = of_parts[part][row];
+        share_out(shares, kind, of_row, count, share * cluster->spread_mm2);
+        for (int k = 0; k < alb_link_codes(kind); k++)
+            distances[k][row] = shares[k];
+    }
+}
+
+// Whether the rows see a source from distances too different for one look at how its profile bends.
+static bool is_near(const float distances[ALB_BLOCK])
+{
+    float least = INFINITY, most = 0;
+    for (int row = 0; row < ALB_BLOCK; row++)
+        if (isfinite(distances[row]))
+            least = fminf(least, distances[row]), most = fmaxf(most, distances[row]);
+    return most - least > 0.25F * (most + least);
+}
+
+// The rows' mean distance, each weighed by what it is sent.
+static float mean_distance(const float distances[ALB_BLOCK], const alb_scatter_kernel_needs *needs)
+{
+    float sum = 0, all = 0;
+    for (int row = 0; row < ALB_BLOCK; row++)
+        if (isfinite(distances[row])) {
+            const float *shares = needs->shares[alb_scatter_kernel_bin(needs, distances[row])];
+            const float weight = shares[0] + shares[1] + shares[2] + FLT_MIN;
+            sum += weight * distances[row], all += weight;
+        }
+    return all > 0 ? sum / all : INFINITY;
+}
+
+// Distances along the paths; the result is the furthest. Rows that are left out stand nowhere.
+static float find_paths(float distances[ALB_SHARES_MAX][ALB_BLOCK], const viewer *v, const wish *wished, int kind,
+                        const detour detours[ALB_BLOCK])
+{
+    float furthest = 0;
+    find_distances(distances, v, wished, kind);
+    for (int k = 0; k < alb_link_codes(kind); k++)
+        for (uint32_t row = 0; row < ALB_BLOCK; row++) {
+            const detour *by = &detours[row < v->row_count ? row : v->row_count - 1];
+            if (wished->left_out >> row & 1 || !isfinite(by->length))
+                distances[k][row] = INFINITY;
+            else
+                furthest = fmaxf(furthest, distances[k][row] = fmaxf(lengthened(distances[k][row], by), 0));
+        }
+    return furthest;
+}
+
+static void add_link(const viewer *v, const wish *wished, int kind, const detour detours[ALB_BLOCK])
+{
+    const int side = wished->side;
+    const alb_scatter_kernel *kernel = v->kernels[side];
+    workspace *work = v->work;
+    float distances[ALB_SHARES_MAX][ALB_BLOCK];
+    const float furthest = find_paths(distances, v, wished, kind, detours);
+    if ((kind == ALB_LINK_NODE || kind == ALB_LINK_PATCH) && is_near(distances[0]))
+        kind++;
+    const int count = alb_link_codes(kind);
     work->found.links = alb_grow(&work->found.failed, work->found.links, &work->found.capacity, work->found.count, 1,
                                  sizeof *work->found.links);
     work->found.codes = alb_grow(&work->found.failed, work->found.codes, &work->found.code_capacity,
-                                 work->found.code_count, (size_t)count * ALB_BLOCK, 1);
+                                 work->found.code_count, alb_link_code_bytes(kind), 1);
     if (work->found.failed)
         return;
-    for (int part = 0; part < count; part++) {
-        measure(distances[part], v, &parts[part], side == ALB_TRANSMISSION);
-        for (uint32_t row = 0; row < ALB_BLOCK; row++)
-            if (row >= v->row_count || wished->left_out >> row & 1 || !isfinite(detours[row].length))
-                distances[part][row] = INFINITY;
-            else
-                furthest = fmaxf(furthest, distances[part][row] = lengthened(distances[part][row], &detours[row]));
-    }
     int octave = ilogbf(fmaxf(furthest, 1e-30F)) + 1 - kernel->first_octave;
     octave = octave < 0 ? 0 : octave < kernel->octave_count ? octave : kernel->octave_count - 1;
     const float per_mm = ldexpf(ALB_CODES - 2, -(kernel->first_octave + octave));
     alb_found_link *added = &work->found.links[work->found.count++];
-    *added = (alb_found_link){
-        wished->node, (uint16_t)((side * ALB_OCTAVES + octave) * ALB_LEVELS + level), {0}, work->found.code_count};
-    aim(added->direction, v, cluster, side);
-    if (level) // of parts all round
-        added->direction[3] = 64;
-    for (int part = 0; part < count; part++) {
-        encode(work->found.codes + work->found.code_count, distances[part], per_mm);
-        work->found.code_count += ALB_BLOCK;
-    }
+    *added = (alb_found_link){.source = wished->source,
+                              .bucket = (uint16_t)((side * ALB_OCTAVES + octave) * ALB_LINK_KINDS + kind),
+                              .codes = work->found.code_count};
+    if (kind <= ALB_LINK_NEAR_NODE)
+        aim(added->direction, v, &v->forest->clusters[wished->cluster], side);
+    uint8_t *codes = work->found.codes + work->found.code_count;
+    if (alb_link_bend_bytes(kind))
+        *codes++ = encode(mean_distance(distances[0], v->needs[side]), per_mm);
+    for (int k = 0; k < count * ALB_BLOCK; k++)
+        *codes++ = encode(distances[k / ALB_BLOCK][k % ALB_BLOCK], per_mm);
+    work->found.code_count += alb_link_code_bytes(kind);
 }
 
 // The patch as the row sees it: through a slab, moved along the axis into the plane of the row.
@@ -200,8 +324,8 @@ static void place_triangle(alb_vector t[3], const viewer *v, const alb_cluster *
         t[k] = alb_add(t[k], alb_times(alb_dot(axis, alb_sub(p, t[k])), axis));
 }
 
-// How the patch is parted for a row at this distance of the centroids: EXACT where no parts do.
-static int level_of(const viewer *v, const alb_cluster *cluster, int side, uint32_t row, float distance)
+// How the patch is taken by a row at this distance of the centroids: EXACT where no parts do.
+static int kind_of(const viewer *v, const alb_cluster *cluster, int side, uint32_t row, float distance)
 {
     const alb_scatter_kernel_needs *needs = v->needs[side];
     float gap = distance - cluster->radius_mm;
@@ -214,22 +338,28 @@ static int level_of(const viewer *v, const alb_cluster *cluster, int side, uint3
     const float allowed = 0.15F * (float)v->error_wanted, from = fmaxf(distance, 1e-15F);
     const int most = alb_parts_most(cluster);
     int parts = 1;
-    for (int c = 0; c < 3; c++)
+    bool thirds = true;
+    for (int c = 0; c < 3; c++) {
+        thirds &= needs->shares[bin][c] * cluster->area_mm2 *
+                      alb_parts_left_by_thirds(cluster, needs->slopes[bin][c], from) <=
+                  allowed;
         for (;; parts *= 4) {
             const float left = needs->shares[bin][c] * cluster->area_mm2 *
                                fminf(alb_parts_left(cluster, parts, needs->slopes[bin][c], from), 1);
-            if (left > 4 * allowed && parts == most && distance <= 3 * cluster->radius_mm)
+            if (left > 16 * allowed && parts == most && distance <= 3 * cluster->radius_mm)
                 return EXACT;
             if (left <= allowed || parts == most)
                 break;
         }
-    return alb_parts_level(cluster, parts);
+    }
+    return parts == 1 ? ALB_LINK_PATCH : thirds ? ALB_LINK_THIRDS : ALB_LINK_EIGHTHS;
 }
 
 // The patch at `scale` times its distances; its integral is then scale^2 times as large.
-static void add_pair(const viewer *v, uint32_t node, int side, uint32_t row, float scale)
+static void add_pair(const viewer *v, const wish *wished, uint32_t row, float scale)
 {
-    const alb_cluster *cluster = &v->forest->clusters[node];
+    const int side = wished->side;
+    const alb_cluster *cluster = &v->forest->clusters[wished->cluster];
     const alb_vector p = v->patches->centroids[v->forest->patches[v->first_leaf + row]];
     workspace *work = v->work;
     alb_vector t[3];
@@ -241,7 +371,7 @@ static void add_pair(const viewer *v, uint32_t node, int side, uint32_t row, flo
     for (int k = 0; k < 3; k++)
         t[k] = alb_add(p, alb_times((double)scale, alb_sub(t[k], p)));
     alb_exact_pair *pair = &work->found.pairs[work->found.pair_count++];
-    *pair = (alb_exact_pair){.node = node,
+    *pair = (alb_exact_pair){.leaf = wished->source,
                              .kernel = v->index[side],
                              .row = (uint8_t)row,
                              .per_area = 1 / (scale * scale * cluster->area_mm2)};
@@ -249,37 +379,38 @@ static void add_pair(const viewer *v, uint32_t node, int side, uint32_t row, flo
 }
 
 // Each row by itself where the patch is near for any.
-static void add_leaf(const viewer *v, uint32_t node, uint32_t leaf, int side)
+static void add_leaf(const viewer *v, uint32_t index, uint32_t leaf, int side)
 {
-    const alb_cluster *cluster = &v->forest->clusters[node];
+    const alb_cluster *cluster = &v->forest->clusters[index];
     const uint32_t own = leaf - v->first_leaf;
-    float distances[ALB_BLOCK];
+    const unsigned all = (1U << v->row_count) - 1;
+    float distances[ALB_BLOCK], along_mm2[ALB_BLOCK];
     alb_source whole;
     unsigned left_out = own < v->row_count ? 1U << own : 0;
-    int level = 0;
+    int kind = ALB_LINK_PATCH;
     memcpy(whole.at, cluster->centre_mm, sizeof whole.at);
     memcpy(whole.moments, cluster->moments, sizeof whole.moments);
-    measure(distances, v, &whole, side == ALB_TRANSMISSION);
+    measure(distances, along_mm2, v, &whole, side == ALB_TRANSMISSION);
     for (uint32_t row = 0; row < v->row_count; row++) {
         if (left_out >> row & 1)
             continue;
-        const int wanted = level_of(v, cluster, side, row, distances[row]);
+        const int wanted = kind_of(v, cluster, side, row, distances[row]);
         if (wanted == EXACT) {
-            want(v, node, side, EXACT, ~(1U << row));
+            want(v, (wish){index, leaf, (uint8_t)side, (uint8_t) ~(1U << row), EXACT});
             left_out |= 1U << row;
-        } else if (alb_levels[wanted].parts >= alb_levels[level].parts) {
-            level = wanted;
+        } else if (wanted > kind) {
+            kind = wanted;
         }
     }
-    if (left_out != (1U << v->row_count) - 1)
-        want(v, node, side, level, left_out);
+    if (left_out != all)
+        want(v, (wish){index, leaf, (uint8_t)side, (uint8_t)left_out, (int8_t)kind});
 }
 
-static void visit(const viewer *v, uint32_t node, uint32_t leaf, uint32_t count, int side)
+static void visit(const viewer *v, uint32_t index, uint32_t leaf, uint32_t count, int side)
 {
-    const alb_cluster *cluster = &v->forest->clusters[node];
+    const alb_cluster *cluster = &v->forest->clusters[index];
     if (count == 1) {
-        add_leaf(v, node, leaf, side);
+        add_leaf(v, index, leaf, side);
         return;
     }
     float to[3];
@@ -289,14 +420,14 @@ static void visit(const viewer *v, uint32_t node, uint32_t leaf, uint32_t count,
         project_for(to, v, v->middle_row);
     const float room = sqrtf(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]) - v->radius;
     const int bin = alb_scatter_kernel_bin(v->needs[side], fmaxf(room - 0.5F * cluster->radius_mm, 0));
-    if ((side == ALB_TRANSMISSION || cluster->radius_mm <= 0.5F * room) &&
+    if ((side == ALB_TRANSMISSION || cluster->radius_mm <= 0.65F * room) &&
         12 * cluster->spread_mm2 <= v->needs[side]->size2_mm2[bin]) {
-        want(v, node, side, 0, 0);
+        want(v, (wish){index, index - leaf, (uint8_t)side, 0, ALB_LINK_NODE});
         return;
     }
     const uint32_t left = alb_left_count(count);
-    visit(v, node + 1, leaf, left, side);
-    visit(v, node + 2 * left, leaf + left, count - left, side);
+    visit(v, index + 1, leaf, left, side);
+    visit(v, index + 2 * left, leaf + left, count - left, side);
 }
 
 // Which profile light takes from one face to another: between the faces of a slab that of transmission.
@@ -360,7 +491,7 @@ static void measure_paths(const viewer *v, uint32_t from)
     if (work->found.failed)
         return;
     for (size_t k = 0; k < all; k++) {
-        const alb_cluster *cluster = k < n ? &v->forest->clusters[work->wishes[k].node] : NULL;
+        const alb_cluster *cluster = k < n ? &v->forest->clusters[work->wishes[k].cluster] : NULL;
         const uint32_t row = (uint32_t)(k - n), leaf = cluster ? cluster->leaf : v->first_leaf + row;
         float at[3];
         for (int i = 0; i < 3; i++)
@@ -398,7 +529,7 @@ static unsigned find_detours(const viewer *v, uint32_t from, unsigned rows)
     }
     for (size_t k = 0; k < n; k++) {
         wish *wished = &work->wishes[k];
-        const alb_cluster *cluster = &v->forest->clusters[wished->node];
+        const alb_cluster *cluster = &v->forest->clusters[wished->cluster];
         if (is_sheet(v) && v->tree->face != ALB_FACE_EDGE &&
             alb_optical_paths_face(v->paths, v->forest->patches[cluster->leaf]) != ALB_RIM)
             wished->side = work->opposite[k] ? ALB_TRANSMISSION : ALB_REFLECTION;
@@ -431,18 +562,18 @@ static void grant(const viewer *v)
     for (size_t k = 0; !work->found.failed && k < n; k++) {
         const wish *wished = &work->wishes[k];
         uint32_t row = 0;
-        if (wished->level != EXACT) {
-            add_link(v, wished, wished->level, work->detours[k]);
+        if (wished->kind != EXACT) {
+            add_link(v, wished, wished->kind, work->detours[k]);
             continue;
         }
         while (wished->left_out >> row & 1)
             row++;
         const detour *by = &work->detours[k][row];
         const float scale = by->length != 0 ? 1 + by->length / by->at : 1;
-        if (scale > 0.5F && scale < 1.25F)
-            add_pair(v, wished->node, wished->side, row, scale);
+        if (scale > 0.5F && scale < 2.5F)
+            add_pair(v, wished, row, scale);
         else
-            add_link(v, wished, 3, work->detours[k]);
+            add_link(v, wished, ALB_LINK_EIGHTHS, work->detours[k]);
     }
 }
 
@@ -454,7 +585,7 @@ static void link_block(alb_link_block *block, viewer *v, const uint16_t kernels[
     for (size_t t = 0; t < v->forest->tree_count; t++) {
         const alb_tree *tree = &v->forest->trees[t];
         if (tree->body == v->tree->body)
-            visit(v, tree->first_node, tree->first_leaf, tree->leaf_count, side_between(tree, v->tree));
+            visit(v, tree->first_cluster, tree->first_leaf, tree->leaf_count, side_between(tree, v->tree));
     }
     grant(v);
     if (!v->work->found.failed)

@@ -6,12 +6,10 @@
 //     (b h)^4 / 1920 + min(b d, 1) (h / d)^4 / 500 + b^2 (v1 - v2) / 40
 // The first term is what second moments leave of an exponential, the second what they leave of a cusp at no distance,
 // the third that the variance along the line of sight is not their mean.
+// Three distances that have its first three moments, and the fourth where it is far, leave of it
+//     (b h)^6 / 700,000 + min(b d, 1) (h / d)^4 / 4000
 #include "render/scatter_parts.h"
 #include <math.h>
-
-const alb_level alb_levels[ALB_LEVELS] = {
-    {1, 1}, {4, 1.0F / 4}, {4, 1.0F / 16}, {16, 1.0F / 16}, {16, 1.0F / 256}, {64, 1.0F / 4096},
-};
 
 // Halves the triangle across its longest side, and the halves.
 static void halve(alb_source *parts, alb_vector a, alb_vector b, alb_vector c, int count)
@@ -48,14 +46,6 @@ static void quarter(alb_source *parts, alb_vector a, alb_vector b, alb_vector c,
     quarter(parts + 3 * each, ab, bc, ca, each);
 }
 
-void alb_parts_cut(alb_source parts[ALB_PARTS_MAX], const alb_vector t[3], const alb_level *level)
-{
-    if (level->spread * (float)level->parts < 0.99F) // a long one
-        halve(parts, t[0], t[1], t[2], level->parts);
-    else
-        quarter(parts, t[0], t[1], t[2], level->parts);
-}
-
 // The principal variances of a part when a patch is in so many: halved across its length until it is no longer one.
 static void variances_of_part(float variances[2], const alb_cluster *cluster, int parts)
 {
@@ -73,6 +63,12 @@ float alb_parts_left(const alb_cluster *cluster, int parts, float b, float dista
     return bh2 * bh2 / 1920 + fminf(b * distance, 1) * near * near / 500 + b * b * (variances[0] - variances[1]) / 40;
 }
 
+float alb_parts_left_by_thirds(const alb_cluster *cluster, float b, float distance)
+{
+    const float h2 = 12 * cluster->spread_mm2, bh2 = b * b * h2, near = h2 / (distance * distance);
+    return bh2 * bh2 * bh2 / 7e5F + fminf(b * distance, 1) * near * near / 4000;
+}
+
 static bool is_long(const alb_cluster *cluster, int parts)
 {
     float variances[2];
@@ -86,11 +82,14 @@ int alb_parts_most(const alb_cluster *cluster)
     return is_long(cluster, ALB_PARTS_MAX / 4) ? ALB_PARTS_MAX : ALB_PARTS_MAX / 4;
 }
 
-int alb_parts_level(const alb_cluster *cluster, int parts)
+float alb_parts_cut(alb_source parts[ALB_PARTS_MAX], const alb_cluster *cluster, const alb_vector t[3], int count)
 {
-    if (is_long(cluster, parts))
-        return parts == 4 ? 2 : parts == 16 ? 4 : 5;
-    return parts == 1 ? 0 : parts == 4 ? 1 : 3;
+    const bool across = is_long(cluster, count);
+    if (across)
+        halve(parts, t[0], t[1], t[2], count);
+    else
+        quarter(parts, t[0], t[1], t[2], count);
+    return 1 / (float)(across ? count * count : count);
 }
 
 // Squared distance of p from the segment a b.

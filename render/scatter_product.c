@@ -1,7 +1,9 @@
-// The product: for each block of exit patches, for each link, eight look-ups times one cluster. In single precision
+// The product: for each block of exit patches, for each link, eight look-ups times one light. In single precision
 // within a run of links, in double beyond it: rounding stays near 1e-7.
-//     out_j += sum over links (s(d) + v s''(d) / 2) light + s'(d) u . moment
-// u the direction to the cluster, v its variance along it; of a patch in n parts light / n and the variance of a part.
+//     out_j += sum over links s(d_j) [light + (s'/s) u . moment + v (s''/2s) light + ...]
+// u the direction to the source, v its variance along it. What stands in brackets is taken at a mean of the block's
+// distances: of an exponential s'/s and s''/s are the same at all of them. Where the distances differ much s'' is taken
+// at each. Of a patch at several distances each sends a share of the light and nothing else.
 #include "render/scatter_product.h"
 #include "base/memory.h"
 #include "base/vector_clones.h"
@@ -9,92 +11,158 @@
 #include <string.h>
 
 typedef float float4 __attribute__((vector_size(16)));
-typedef float float8 __attribute__((vector_size(32)));
 typedef int8_t byte4 __attribute__((vector_size(4)));
 
-// Light of a part and its moment along the direction, R, G and B each; what follows them meets zeros in the tables.
-static inline void take_node(float8 *light, const alb_scatter_node *node, const int8_t direction[4], float share)
+static inline float4 load(const float values[4])
 {
-    float4 all, axes[3];
-    byte4 bytes;
-    memcpy(&all, node, sizeof all);
-    memcpy(axes, node->moments, sizeof axes);
-    memcpy(&bytes, direction, sizeof bytes);
-    const float4 to = __builtin_convertvector(bytes, float4) * (1.0F / INT8_MAX);
-    const float4 along = to[0] * axes[0] + to[1] * axes[1] + to[2] * axes[2];
-    *light = __builtin_shufflevector(share * all, along, 0, 1, 2, 3, 4, 5, 6, 7);
-}
-
-static inline float variance_of(const alb_scatter_node *node, const int8_t direction[4], const alb_level *level)
-{
-    return level->spread * node->spread_mm2 * (1.0F / 64) * (float)direction[3];
+    float4 all;
+    memcpy(&all, values, sizeof all);
+    return all;
 }
 
 // Where a run is read.
 typedef struct stretch {
-    const float (*table)[16];
-    const alb_scatter_node *node;
+    const float (*values)[4], (*bends)[8];
+    const alb_forest *forest;
     const uint16_t *deltas;
     const uint8_t *codes;
     const int8_t (*directions)[4];
+    uint32_t first;
     size_t count;
-    const alb_level *level;
+    int kind;
 } stretch;
 
-// rows += (value + v bend) light, for the rows of a block; `parts` is the level's, told apart for the compiler.
-static inline __attribute__((always_inline)) void add_links(double sums[ALB_BLOCK][3], const stretch *run, int parts)
+static inline __attribute__((always_inline)) void add_rows(float4 rows[ALB_BLOCK], const stretch *run,
+                                                           const uint8_t *codes, float4 light)
 {
-    float8 rows[ALB_BLOCK] = {{0}};
-    const alb_scatter_node *node = run->node;
-    const uint8_t *codes = run->codes;
-    for (size_t k = 0; k < run->count; k++) {
-        float8 light, value, bend;
-        node += run->deltas[k];
-        take_node(&light, node, run->directions[k], 1 / (float)parts);
-        const float v = variance_of(node, run->directions[k], run->level);
-        for (int part = 0; part < parts; part++, codes += ALB_BLOCK)
 #pragma GCC unroll 8
-            for (int row = 0; row < ALB_BLOCK; row++) {
-                memcpy(&value, run->table[codes[row]], sizeof value);
-                memcpy(&bend, run->table[codes[row]] + 8, sizeof bend);
-                rows[row] += (value + v * bend) * light;
-            }
-    }
+    for (int row = 0; row < ALB_BLOCK; row++)
+        rows[row] += load(run->values[codes[row]]) * light;
+}
+
+static inline __attribute__((always_inline)) void add_near_rows(float4 rows[ALB_BLOCK], const stretch *run,
+                                                                const uint8_t *codes, float4 light, float4 spread)
+{
+#pragma GCC unroll 8
+    for (int row = 0; row < ALB_BLOCK; row++)
+        rows[row] += load(run->values[codes[row]]) * (light + load(run->bends[codes[row]] + 4) * spread);
+}
+
+static inline __attribute__((always_inline)) void end_run(double sums[ALB_BLOCK][3], const float4 rows[ALB_BLOCK])
+{
     for (int row = 0; row < ALB_BLOCK; row++)
         for (int c = 0; c < 3; c++)
-            sums[row][c] += (double)(rows[row][c] + rows[row][4 + c]);
+            sums[row][c] += (double)rows[row][c];
+}
+
+// What the extent of a node adds to its light: v s''/2s, and the fourth order of an exponential, (s''/s)^2 m_4 / 24
+// with m_4 = 12/5 v^2, that of a triangle.
+static inline __attribute__((always_inline)) float4 by_extent(const float bend[8], float spread)
+{
+    const float4 second = load(bend + 4) * spread;
+    return second + 0.4F * second * second;
+}
+
+// Nodes: light and its moments.
+static inline __attribute__((always_inline)) void add_nodes(double sums[ALB_BLOCK][3], const stretch *run, bool near)
+{
+    float4 rows[ALB_BLOCK] = {{0}};
+    const alb_scatter_node *node = run->forest->nodes + run->first;
+    const uint8_t *codes = run->codes;
+    for (size_t k = 0; k < run->count; k++, codes += ALB_BLOCK) {
+        const float *bend = run->bends[*codes++];
+        node += run->deltas[k];
+        byte4 bytes;
+        memcpy(&bytes, run->directions[k], sizeof bytes);
+        const float4 to = __builtin_convertvector(bytes, float4), light = load(node->light);
+        const float4 along =
+            to[0] * load(node->moments[0]) + to[1] * load(node->moments[1]) + to[2] * load(node->moments[2]);
+        const float4 moved = light + load(bend) * (1.0F / INT8_MAX) * along;
+        const float spread = to[3] * (1.0F / 64) * node->light[3];
+        if (near)
+            add_near_rows(rows, run, codes, moved, light * spread);
+        else
+            add_rows(rows, run, codes, moved + light * by_extent(bend, spread));
+    }
+    end_run(sums, rows);
+}
+
+// Patches, taken at one distance.
+static inline __attribute__((always_inline)) void add_patches(double sums[ALB_BLOCK][3], const stretch *run, bool near)
+{
+    float4 rows[ALB_BLOCK] = {{0}};
+    const float(*light)[4] = (const float(*)[4])run->forest->lights + run->first;
+    const uint8_t *codes = run->codes;
+    for (size_t k = 0; k < run->count; k++, codes += ALB_BLOCK) {
+        light += run->deltas[k];
+        const float4 all = load(*light);
+        if (near) {
+            add_near_rows(rows, run, codes, all, all[3] * all);
+        } else {
+            const float *bend = run->bends[*codes++];
+            add_rows(rows, run, codes, all + load(bend + 4) * all[3] * all);
+        }
+    }
+    end_run(sums, rows);
+}
+
+// Patches whose light is shared out.
+static inline __attribute__((always_inline)) void add_shares(double sums[ALB_BLOCK][3], const stretch *run, int kind)
+{
+    float4 rows[ALB_BLOCK] = {{0}};
+    const float(*light)[4] = (const float(*)[4])run->forest->lights + run->first;
+    const uint8_t *codes = run->codes;
+    for (size_t k = 0; k < run->count; k++) {
+        light += run->deltas[k];
+        const float4 all = load(*light);
+        for (int code = 0; code < alb_link_codes(kind); code++, codes += ALB_BLOCK)
+            add_rows(rows, run, codes, all * alb_link_share(kind, code));
+    }
+    end_run(sums, rows);
 }
 
 ALB_VECTOR_CLONES
 static void add_run(double sums[ALB_BLOCK][3], const stretch *run)
 {
-    if (run->level->parts == 1)
-        add_links(sums, run, 1);
+    if (run->kind == ALB_LINK_NODE)
+        add_nodes(sums, run, false);
+    else if (run->kind == ALB_LINK_NEAR_NODE)
+        add_nodes(sums, run, true);
+    else if (run->kind == ALB_LINK_PATCH)
+        add_patches(sums, run, false);
+    else if (run->kind == ALB_LINK_NEAR_PATCH)
+        add_patches(sums, run, true);
+    else if (run->kind == ALB_LINK_THIRDS)
+        add_shares(sums, run, ALB_LINK_THIRDS);
     else
-        add_links(sums, run, run->level->parts);
+        add_shares(sums, run, ALB_LINK_EIGHTHS);
 }
 
-static stretch begin(const alb_link_block *block)
+static stretch begin(const alb_link_block *block, const alb_forest *forest)
 {
-    return (stretch){
-        .deltas = block->deltas, .codes = block->codes, .directions = (const int8_t(*)[4])block->directions};
+    return (stretch){.forest = forest,
+                     .deltas = block->deltas,
+                     .codes = block->codes,
+                     .directions = (const int8_t(*)[4])block->directions};
 }
 
 // Points the stretch at the run.
-static void take(stretch *at, const alb_link_run *run, const alb_forest *forest, const alb_scatter_kernel *kernels)
+static void take(stretch *at, const alb_link_run *run, const alb_scatter_kernel *kernels)
 {
     const alb_scatter_kernel *kernel = &kernels[run->kernel];
-    at->table = (const float(*)[16])kernel->values + (size_t)(run->octave - kernel->first_used) * ALB_CODES;
-    at->node = forest->nodes + run->first;
+    const size_t octave = (size_t)(run->octave - kernel->first_used) * ALB_CODES;
+    at->values = (const float(*)[4])kernel->values + octave;
+    at->bends = (const float(*)[8])kernel->bends + octave;
+    at->first = run->first;
     at->count = run->count;
-    at->level = &alb_levels[run->level];
+    at->kind = run->kind;
 }
 
 static void pass(stretch *at)
 {
     at->deltas += at->count;
-    at->directions += at->count;
-    at->codes += at->count * (size_t)(ALB_BLOCK * at->level->parts);
+    at->codes += at->count * alb_link_code_bytes(at->kind);
+    at->directions += at->kind <= ALB_LINK_NEAR_NODE ? at->count : 0;
 }
 
 static void add_pairs(double sums[ALB_BLOCK][3], const alb_link_block *block, const alb_forest *forest,
@@ -102,7 +170,7 @@ static void add_pairs(double sums[ALB_BLOCK][3], const alb_link_block *block, co
 {
     for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++)
         for (int c = 0; c < 3 && sides & 1U << kernels[pair->kernel].side; c++)
-            sums[pair->row][c] += (double)(pair->weights[c] * forest->nodes[pair->node].light[c]);
+            sums[pair->row][c] += (double)(pair->weights[c] * forest->lights[pair->leaf][c]);
 }
 
 void alb_product_write_pairs(const alb_links *links, const alb_scatter_kernel *kernels)
@@ -125,9 +193,9 @@ void alb_product_add(double (*out)[3], const alb_links *links, const alb_forest 
     for (size_t b = 0; b < links->block_count; b++) {
         const alb_link_block *block = &links->blocks[b];
         double sums[ALB_BLOCK][3] = {{0}};
-        stretch at = begin(block);
+        stretch at = begin(block, forest);
         for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; pass(&at), run++) {
-            take(&at, run, forest, kernels);
+            take(&at, run, kernels);
             if (sides & 1U << kernels[run->kernel].side)
                 add_run(sums, &at);
         }
@@ -138,71 +206,102 @@ void alb_product_add(double (*out)[3], const alb_links *links, const alb_forest 
     }
 }
 
-// The transposed product: what the rows' areas send to each cluster, at its centre and how it changes from there.
+// The transposed product: what the rows' areas send to each source: to a leaf, and to a node at its centre and how it
+// changes from there.
 typedef struct column {
     float value[3], change[3][3]; // change along x, y, z
 } column;
 
+typedef struct columns {
+    float4 *leaves;
+    column *nodes;
+} columns;
+
 ALB_VECTOR_CLONES
-static void send_run(column *to, const stretch *run, const float areas[ALB_BLOCK])
+static void send_run(const columns *to, const stretch *run, const float areas[ALB_BLOCK])
 {
-    const alb_scatter_node *node = run->node;
+    const int count = alb_link_codes(run->kind);
     const uint8_t *codes = run->codes;
+    size_t at = run->first;
     for (size_t k = 0; k < run->count; k++) {
-        float8 sum = {0}, value, bend;
-        node += run->deltas[k];
-        to += run->deltas[k];
-        const float v = variance_of(node, run->directions[k], run->level), share = 1 / (float)run->level->parts;
-        for (int part = 0; part < run->level->parts; part++, codes += ALB_BLOCK)
+        at += run->deltas[k];
+        const bool near = run->kind == ALB_LINK_NEAR_NODE || run->kind == ALB_LINK_NEAR_PATCH;
+        const float *bend = run->bends[*codes];
+        float4 sum = {0}, bent = {0};
+        codes += alb_link_bend_bytes(run->kind);
+        for (int code = 0; code < count; code++, codes += ALB_BLOCK)
 #pragma GCC unroll 8
             for (int row = 0; row < ALB_BLOCK; row++) {
-                memcpy(&value, run->table[codes[row]], sizeof value);
-                memcpy(&bend, run->table[codes[row]] + 8, sizeof bend);
-                sum += (value + v * bend) * areas[row];
+                const float4 sent = load(run->values[codes[row]]) * (areas[row] * alb_link_share(run->kind, code));
+                sum += sent;
+                bent += near ? sent * load(run->bends[codes[row]] + 4) : sent;
             }
+        if (run->kind > ALB_LINK_NEAR_NODE) {
+            bent = near ? bent : sum * load(bend + 4);
+            to->leaves[at] += sum + bent * (run->kind <= ALB_LINK_NEAR_PATCH ? run->forest->lights[at][3] : 0);
+            continue;
+        }
+        const float spread = (float)run->directions[k][3] / 64 * run->forest->nodes[at].light[3];
+        const float4 change = sum * load(bend) * (1.0F / INT8_MAX),
+                     whole = sum + (near ? bent * spread : sum * by_extent(bend, spread));
         for (int c = 0; c < 3; c++) {
-            to->value[c] += sum[c] * share;
+            to->nodes[at].value[c] += whole[c];
             for (int axis = 0; axis < 3; axis++)
-                to->change[axis][c] += sum[4 + c] * (float)run->directions[k][axis] * (1.0F / INT8_MAX);
+                to->nodes[at].change[axis][c] += change[c] * (float)run->directions[k][axis];
         }
     }
 }
 
-static void add_block_columns(column *columns, const alb_link_block *block, const alb_forest *forest,
+static void add_block_columns(const columns *to, const alb_link_block *block, const alb_forest *forest,
                               const alb_scatter_kernel *kernels)
 {
     float areas[ALB_BLOCK] = {0};
     memcpy(areas, forest->areas_mm2 + block->first_leaf, block->row_count * sizeof *areas);
     for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++)
         for (int c = 0; c < 3; c++)
-            columns[pair->node].value[c] += areas[pair->row] * pair->weights[c];
-    stretch at = begin(block);
+            to->leaves[pair->leaf][c] += areas[pair->row] * pair->weights[c];
+    stretch at = begin(block, forest);
     for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; pass(&at), run++) {
-        take(&at, run, forest, kernels);
-        send_run(columns + run->first, &at, areas);
+        take(&at, run, kernels);
+        send_run(to, &at, areas);
     }
 }
 
-// What a cluster got, its patches have each.
-static void hand_down(double (*sums)[3], const column *columns, const alb_forest *forest, uint32_t node,
-                      uint32_t first_leaf, uint32_t count, const column *above, uint32_t parent)
+// A column seen from a point off the centre that it was found at.
+static void move(column *to, const column *from, const float off[3])
 {
-    column here = *above;
+    *to = *from;
+    for (int c = 0; c < 3; c++)
+        for (int axis = 0; axis < 3; axis++)
+            to->value[c] += from->change[axis][c] * off[axis];
+}
+
+// What a node got, its patches have each.
+static void hand_down(double (*sums)[3], const columns *from, const alb_forest *forest, uint32_t node,
+                      uint32_t first_leaf, uint32_t count, const column *above)
+{
+    const uint32_t left = alb_left_count(count), counts[2] = {left, count - left};
+    const uint32_t nodes[2] = {node + 1, node + left}, leaves[2] = {first_leaf, first_leaf + left};
+    column whole = *above;
     for (int c = 0; c < 3; c++) {
-        for (int axis = 0; axis < 3; axis++) {
-            here.value[c] += above->change[axis][c] *
-                             (forest->nodes[node].moments[axis][3] - forest->nodes[parent].moments[axis][3]);
-            here.change[axis][c] += columns[node].change[axis][c];
-        }
-        here.value[c] += columns[node].value[c];
-        if (count == 1)
-            sums[forest->patches[first_leaf]][c] += (double)here.value[c];
+        whole.value[c] += from->nodes[node].value[c];
+        for (int axis = 0; axis < 3; axis++)
+            whole.change[axis][c] += from->nodes[node].change[axis][c];
     }
-    if (count == 1)
-        return;
-    const uint32_t left = alb_left_count(count);
-    hand_down(sums, columns, forest, node + 1, first_leaf, left, &here, node);
-    hand_down(sums, columns, forest, node + 2 * left, first_leaf + left, count - left, &here, node);
+    for (int child = 0; child < 2; child++) {
+        const uint32_t leaf = leaves[child];
+        column part;
+        float off[3];
+        for (int k = 0; k < 3; k++)
+            off[k] = (counts[child] > 1 ? forest->nodes[nodes[child]].moments[k][3] : forest->centres_mm[leaf][k]) -
+                     forest->nodes[node].moments[k][3];
+        move(&part, &whole, off);
+        if (counts[child] > 1)
+            hand_down(sums, from, forest, nodes[child], leaf, counts[child], &part);
+        else
+            for (int c = 0; c < 3; c++)
+                sums[forest->patches[leaf]][c] += (double)part.value[c] + (double)from->leaves[leaf][c];
+    }
 }
 
 bool alb_product_add_columns(double (*sums)[3], const alb_links *links, const alb_forest *forest,
@@ -210,20 +309,29 @@ bool alb_product_add_columns(double (*sums)[3], const alb_links *links, const al
 {
     enum { SHARES = 2 }; // as many sums however many threads: the same bytes
     static const column nothing = {{0}, {{0}}};
-    column *columns = alb_allocate(SHARES * forest->node_count, sizeof *columns, error);
-    if (!columns)
-        return false;
+    columns shares[SHARES] = {{0}};
+    bool ok = true;
+    for (int k = 0; ok && k < SHARES; k++)
+        ok = (shares[k].leaves = alb_allocate(forest->leaf_count, sizeof *shares[k].leaves, error)) &&
+             (shares[k].nodes = alb_allocate(forest->leaf_count, sizeof *shares[k].nodes, error));
 #pragma omp parallel for schedule(dynamic, 1)
-    for (size_t share = 0; share < SHARES; share++)
-        for (size_t b = links->block_count * share / SHARES; b < links->block_count * (share + 1) / SHARES; b++)
-            add_block_columns(columns + share * forest->node_count, &links->blocks[b], forest, kernels);
+    for (size_t k = 0; k < (ok ? SHARES : 0); k++)
+        for (size_t b = links->block_count * k / SHARES; b < links->block_count * (k + 1) / SHARES; b++)
+            add_block_columns(&shares[k], &links->blocks[b], forest, kernels);
 #pragma omp parallel for schedule(dynamic, 1)
-    for (size_t t = 0; t < forest->tree_count; t++) {
+    for (size_t t = 0; t < (ok ? forest->tree_count : 0); t++) {
         const alb_tree *tree = &forest->trees[t];
-        for (size_t share = 0; share < SHARES; share++)
-            hand_down(sums, columns + share * forest->node_count, forest, tree->first_node, tree->first_leaf,
-                      tree->leaf_count, &nothing, tree->first_node);
+        for (int k = 0; k < SHARES; k++)
+            if (tree->leaf_count > 1)
+                hand_down(sums, &shares[k], forest, tree->first_cluster - tree->first_leaf, tree->first_leaf,
+                          tree->leaf_count, &nothing);
+            else
+                for (int c = 0; c < 3; c++)
+                    sums[forest->patches[tree->first_leaf]][c] += (double)shares[k].leaves[tree->first_leaf][c];
     }
-    free(columns);
-    return true;
+    for (int k = 0; k < SHARES; k++) {
+        free(shares[k].leaves);
+        free(shares[k].nodes);
+    }
+    return ok;
 }

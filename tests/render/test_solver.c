@@ -34,19 +34,9 @@ static void sweep(alb_rgb *x, const void *data, const alb_rgb *right)
         }
 }
 
-// A coarse level of the crudest sort: one bounce.
-static void coarse(alb_rgb *x, const void *data, const alb_rgb *right)
-{
-    apply(x, data, right);
-    for (size_t i = 0; i < ((const dense *)data)->n; i++)
-        for (int c = 0; c < 3; c++)
-            x[i][c] += right[i][c];
-}
-
 static alb_bounce bounce_of(const dense *d)
 {
-    return (alb_bounce){
-        .count = d->n, .areas_mm2 = d->areas, .data = d, .apply = apply, .sweep = sweep, .coarse = coarse};
+    return (alb_bounce){.count = d->n, .areas_mm2 = d->areas, .data = d, .apply = apply, .sweep = sweep};
 }
 
 // Elimination with pivots: (I - K) x = right, one channel.
@@ -133,7 +123,7 @@ static void solvers_agree_with_elimination(void **state)
         fill_random(&d, 7 + 29 * trial, 0.9, trial);
         fill_light(light, d.n, trial);
         const alb_bounce bounce = bounce_of(&d);
-        for (int solver = 0; solver < ALB_SOLVERS; solver++) {
+        for (int solver = 0; solver < ALB_SOLVER_TWO_LEVEL; solver++) {
             alb_error error = {0};
             alb_radiosity_report report;
             check_ok(alb_solver_run(found, &report, (alb_solver)solver, &bounce, (const alb_rgb *)light, NULL, 1e-11,
@@ -183,7 +173,7 @@ static void any_scattering_on_a_sphere_is_exact(void **state)
                 d.k[c][j][i] = rows[j][c] * d.areas[i] / all;
         }
     const alb_bounce bounce = bounce_of(&d);
-    for (int solver = 0; solver < ALB_SOLVERS; solver++) {
+    for (int solver = 0; solver < ALB_SOLVER_TWO_LEVEL; solver++) {
         check_ok(
             alb_solver_run(found, &report, (alb_solver)solver, &bounce, (const alb_rgb *)first, NULL, 1e-12, &error),
             &error);
@@ -226,7 +216,7 @@ static void residual_is_what_it_says(void **state)
         }
     check_relative(once.residual, sqrt(fmax(bounced[0] / lit[0], fmax(bounced[1] / lit[1], bounced[2] / lit[2]))),
                    1e-12);
-    for (int solver = 0; solver < ALB_SOLVERS; solver++) {
+    for (int solver = 0; solver < ALB_SOLVER_TWO_LEVEL; solver++) {
         alb_error error = {0};
         alb_radiosity_report report;
         check_ok(
@@ -274,7 +264,7 @@ static void chebyshev_interval(void **state)
         else
             check_below(hypot(r[0], r[1]), 1e-6);
         const alb_bounce bounce = bounce_of(&d);
-        for (int solver = 0; solver < ALB_SOLVERS; solver++) {
+        for (int solver = 0; solver < ALB_SOLVER_TWO_LEVEL; solver++) {
             alb_error error = {0};
             alb_radiosity_report report;
             alb_rgb found[2];
@@ -308,7 +298,7 @@ static void albedo_to_one_closed(void **state)
         memcpy(d.k[1], d.k[0], sizeof d.k[0]);
         memcpy(d.k[2], d.k[0], sizeof d.k[0]);
         const alb_bounce bounce = bounce_of(&d);
-        for (int solver = ALB_SOLVER_ENERGY_CORRECTED; solver < ALB_SOLVERS; solver++) {
+        for (int solver = ALB_SOLVER_ENERGY_CORRECTED; solver < ALB_SOLVER_TWO_LEVEL; solver++) {
             alb_error error = {0};
             alb_radiosity_report report;
             check_ok(
@@ -363,7 +353,7 @@ static void empty(void **state)
     for (size_t n = 0; n < 2; n++) { // no patch; one, in the dark
         fill_random(&d, n, 0.5, 1);
         const alb_bounce bounce = bounce_of(&d);
-        for (int solver = 0; solver < ALB_SOLVERS; solver++) {
+        for (int solver = 0; solver < ALB_SOLVER_TWO_LEVEL; solver++) {
             alb_error error = {0};
             alb_radiosity_report report;
             check_ok(
@@ -387,13 +377,13 @@ static void says_what_a_solver_lacks(void **state)
     fill_random(&d, 8, 0.5, 1);
     fill_light(light, 8, 1);
     alb_bounce bounce = bounce_of(&d);
-    bounce.sweep = NULL, bounce.coarse = NULL;
+    bounce.sweep = NULL;
     check_fails(
         alb_solver_run(found, &report, ALB_SOLVER_GAUSS_SEIDEL, &bounce, (const alb_rgb *)light, NULL, 1e-3, &error),
         &error, ALB_USAGE, "rows");
     check_fails(
         alb_solver_run(found, &report, ALB_SOLVER_TWO_LEVEL, &bounce, (const alb_rgb *)light, NULL, 1e-3, &error),
-        &error, ALB_USAGE, "coarse");
+        &error, ALB_USAGE, "apart");
 }
 
 int main(void)
