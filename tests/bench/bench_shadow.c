@@ -204,8 +204,9 @@ static double ray_time(const double *ms, const double *percent, double wanted)
 // Above the line of the rays they are as good in less time: hatched, up and down.
 static void shade(double *x, double *y, const double *ms, const double *percent, double top)
 {
+    const double low = fmax(percent[RAYS - 1] / 4, BOTTOM);
     for (int n = 0; n < SHADE; n++) {
-        y[2 * n] = percent[0] * pow(BOTTOM / percent[0], (double)n / (SHADE - 1));
+        y[2 * n] = percent[0] * pow(low / percent[0], (double)n / (SHADE - 1));
         x[2 * n] = x[2 * n + 1] = ray_time(ms, percent, y[2 * n]);
         y[2 * n + 1] = top;
         if (n % 2) {
