@@ -13,7 +13,7 @@
 #include <string.h>
 
 enum { MEMBERS = 16, CLUSTERS_MAX = 60000 };
-static const double coarse_residual = 0.1;
+static const double coarse_residual = 0.3;
 static const double seen_share = 0.03; // no cluster is more than that of the patches that one of its own sees
 
 typedef struct placed {

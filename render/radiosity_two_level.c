@@ -9,8 +9,9 @@
 // S~ scatters like S_c between clusters and keeps what varies within one where it is. The start costs F alone: S'
 // blurs, and F sees little of what S~ gets wrong.
 //
-// The residual that is stated is a bound: |S' rest| <= sqrt(largest row sum * largest column sum of S') |rest| in the
-// 2-norm weighted by area (Schur), over the length of Q (M + S~ E), which is about |M + S'E| or shorter.
+// The residual that is stated is a bound: |S' rest| <= s |rest| in the 2-norm weighted by area, s the largest row sum
+// of S' (Schur's test; S' is symmetric by area as far as the profile is, so that columns sum to what rows do), over the
+// length of Q (M + S~ E), which is about |M + S'E| or shorter.
 #include "render/radiosity_two_level.h"
 #include "base/memory.h"
 #include <math.h>
@@ -37,17 +38,15 @@ static void find_bounds(run *r)
 {
     const alb_scatter *scatter = r->equations->scatter;
     const alb_clusters *clusters = &r->equations->clusters;
-    double rows[3] = {0}, columns[3] = {0}, squares[3] = {0};
+    double rows[3] = {0}, squares[3] = {0};
     for (size_t p = 0; p < scatter->patch_count; p++)
-        for (int c = 0; c < 3; c++) {
+        for (int c = 0; c < 3; c++)
             rows[c] = fmax(rows[c], scatter->row_sums[p][c]);
-            columns[c] = fmax(columns[c], scatter->column_sums[p][c]);
-        }
     for (size_t k = 0; k < clusters->count; k++)
         for (int c = 0; c < 3; c++)
             squares[c] += clusters->areas_mm2[k] * r->sent[k][c] * r->sent[k][c];
     for (int c = 0; c < 3; c++)
-        r->bound[c] = squares[c] > 0 ? sqrt(rows[c] * columns[c] * r->space.total_mm2 / squares[c]) : 0;
+        r->bound[c] = squares[c] > 0 ? rows[c] * sqrt(r->space.total_mm2 / squares[c]) : 0;
 }
 
 static double worst_of(const run *r, const double length[3])

@@ -10,6 +10,7 @@
 // and T2 is narrower still: the light of a small spot has spread before the columns see it. It costs F and S' once
 // more.
 //
+// T* q is as smooth as scattered light is: V is kept as its means over the clusters of the equations, V^T E ~= V^T Q E.
 // Columns are kept as 16-bit whole numbers of a step of their own, 1/32767 of the largest, rows side by side: a product
 // reads U and V once.
 //
@@ -29,7 +30,9 @@ static const double minus_one[1][3] = {{-1, -1, -1}};
 
 static size_t numbers(const alb_relight *r) { return 3 * (size_t)r->rank; }
 
-static size_t blocks_of(const alb_relight *r) { return (r->count + ROWS - 1) / ROWS; }
+static size_t cluster_count(const alb_relight *r) { return r->equations->clusters.count; }
+
+static size_t blocks_of(const alb_relight *r) { return (cluster_count(r) + ROWS - 1) / ROWS; }
 
 // out += values of one row times light[l % 3].
 ALB_VECTOR_CLONES
@@ -54,19 +57,20 @@ static void dot_row(double out[3], const int16_t *restrict values, const float *
     }
 }
 
-// factors = V^T E, with the steps of V and U.
+// factors = V^T Q E, with the steps of V and U.
 static void project(float *factors, const alb_relight *r, const alb_rgb *irradiance)
 {
-    const size_t count = numbers(r);
+    const size_t count = numbers(r), clusters = cluster_count(r);
+    alb_clusters_average(r->even, &r->equations->clusters, irradiance);
 #pragma omp parallel for schedule(static)
     for (size_t block = 0; block < blocks_of(r); block++) {
         float sums[3 * ALB_RELIGHT_RANK_MAX] = {0}, light[LANES];
-        for (size_t p = block * ROWS; p < r->count && p < (block + 1) * ROWS; p++) {
-            const double *e = irradiance[p];
+        for (size_t k = block * ROWS; k < clusters && k < (block + 1) * ROWS; k++) {
+            const double *e = r->even[k];
             for (int l = 0; l < LANES; l++)
                 light[l] = (float)e[l % 3];
             if (e[0] != 0 || e[1] != 0 || e[2] != 0)
-                add_row(sums, r->v + p * count, light, count);
+                add_row(sums, r->v + k * count, light, count);
         }
         for (size_t k = 0; k < count; k++)
             r->partial[block * count + k] = (double)sums[k];
@@ -101,18 +105,18 @@ void alb_relight_apply(alb_rgb *radiosity, alb_relight *r, const alb_rgb *irradi
     alb_scatter_apply(radiosity, r->equations->scatter, (const alb_rgb *)r->irradiance);
 }
 
-// A column as whole numbers of its step; `weights` (NULL: ones) times it.
-static void pack(int16_t *to, float *steps, const alb_relight *r, int column, const alb_rgb *from,
+// A column of so many rows as whole numbers of its step; `weights` (NULL: ones) times it.
+static void pack(int16_t *to, float *steps, const alb_relight *r, int column, const alb_rgb *from, size_t count,
                  const double *weights, double total)
 {
     const size_t at = 3 * (size_t)column;
     double largest[3] = {0};
-    for (size_t p = 0; p < r->count; p++)
+    for (size_t p = 0; p < count; p++)
         for (int c = 0; c < 3; c++)
             largest[c] = fmax(largest[c], fabs(from[p][c]) * (weights ? weights[p] / total : 1));
     for (int c = 0; c < 3; c++)
         steps[at + (size_t)c] = (float)(largest[c] / INT16_MAX);
-    for (size_t p = 0; p < r->count; p++)
+    for (size_t p = 0; p < count; p++)
         for (int c = 0; c < 3; c++) {
             const double value = from[p][c] * (weights ? weights[p] / total : 1);
             to[p * numbers(r) + at + (size_t)c] =
@@ -192,15 +196,16 @@ static bool find_range(maker *m, alb_error *error)
         }
         alb_form_factors_apply(m->basis[k], out->equations->factors, (const alb_rgb *)m->solution);
         orthonormalise(m, k);
-        pack(out->u, out->u_step, out, k, (const alb_rgb *)m->basis[k], NULL, 1);
+        pack(out->u, out->u_step, out, k, (const alb_rgb *)m->basis[k], out->count, NULL, 1);
     }
     return true;
 }
 
-// V: T* of the columns of Q.
+// V: means over clusters of T* of the columns of Q.
 static bool find_adjoint(maker *m, alb_error *error)
 {
     alb_relight *out = m->out;
+    const alb_clusters *clusters = &out->equations->clusters;
     alb_radiosity_report report;
     for (int k = 0; k < out->rank; k++) {
         if (!alb_radiosity_solve(m->solution, &report, out->equations, ALB_SOLVER_TWO_LEVEL, NULL,
@@ -212,7 +217,9 @@ static bool find_adjoint(maker *m, alb_error *error)
             bounce.apply(m->light, bounce.data, (const alb_rgb *)m->basis[k]);
             alb_space_add(NULL, &m->space, m->solution, minus_one, &m->light, 1);
         }
-        pack(out->v, out->v_step, out, k, (const alb_rgb *)m->solution, m->space.areas_mm2, m->space.total_mm2);
+        alb_clusters_average(out->even, clusters, (const alb_rgb *)m->solution);
+        pack(out->v, out->v_step, out, k, (const alb_rgb *)out->even, clusters->count, clusters->areas_mm2,
+             m->space.total_mm2);
     }
     return true;
 }
@@ -251,10 +258,11 @@ static bool allocate(maker *m, alb_error *error)
         !(m->light = alb_allocate(n, sizeof *m->light, error)) ||
         !(m->solution = alb_allocate(n, sizeof *m->solution, error)) ||
         !(out->u = alb_allocate(n * count, sizeof *out->u, error)) ||
-        !(out->v = alb_allocate(n * count, sizeof *out->v, error)) ||
+        !(out->v = alb_allocate(cluster_count(out) * count, sizeof *out->v, error)) ||
         !(out->u_step = alb_allocate(count, sizeof *out->u_step, error)) ||
         !(out->v_step = alb_allocate(count, sizeof *out->v_step, error)) ||
         !(out->partial = alb_allocate(blocks_of(out) * count, sizeof *out->partial, error)) ||
+        !(out->even = alb_allocate(cluster_count(out), sizeof *out->even, error)) ||
         !(out->bounced = alb_allocate(n, sizeof *out->bounced, error)) ||
         !(out->irradiance = alb_allocate(n, sizeof *out->irradiance, error)))
         return false;
@@ -294,10 +302,11 @@ void alb_relight_free(alb_relight *relight)
     free(relight->partial);
     free(relight->irradiance);
     free(relight->bounced);
+    free(relight->even);
     *relight = (alb_relight){0};
 }
 
 size_t alb_relight_bytes(const alb_relight *relight)
 {
-    return 2 * relight->count * numbers(relight) * sizeof *relight->u;
+    return relight->rank ? (relight->count + cluster_count(relight)) * numbers(relight) * sizeof *relight->u : 0;
 }

@@ -8,10 +8,12 @@ typedef struct alb_relight {
     int rank;                 // columns of U and V for each channel
     bool exact_bounce;        // the first bounce by form factors, the columns for the rest
     alb_radiosity *equations; // borrowed
-    // [patch][column][channel], whole numbers times the column's step; V has the areas in it
+    // [patch][column][channel] and [cluster][column][channel], whole numbers times the column's step; V has the areas
+    // in it
     int16_t *u, *v;
     float *u_step, *v_step;        // [column][channel]
     double *partial;               // scratch
+    alb_rgb *even;                 // scratch, of clusters
     alb_rgb *irradiance, *bounced; // scratch
     double error_percent;          // |B - exact| / |exact|, area-weighted 2-norm, worst channel: rms over test lights
     double worst_percent;          // the worst of them

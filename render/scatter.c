@@ -238,7 +238,7 @@ bool alb_scatter_create(alb_scatter *scatter, const alb_patches *patches, const 
     }
     free(scatter->parts->forest.clusters);
     scatter->parts->forest.clusters = NULL;
-    if (!alb_scatter_rewrite(scatter, surfaces, error)) {
+    if (!alb_scatter_rewrite(scatter, surfaces, error) || !alb_scatter_sum_columns(scatter, error)) {
         alb_scatter_free(scatter);
         return false;
     }
@@ -297,10 +297,9 @@ static void write_local(alb_scatter *scatter, const alb_surface *surfaces)
     }
 }
 
-// Rows: a product with even light. Columns: the transposed product with the areas.
-static bool find_sums(alb_scatter *scatter, alb_error *error)
+// A product with even light.
+static bool sum_rows(alb_scatter *scatter, alb_error *error)
 {
-    alb_scatter_parts *p = scatter->parts;
     double(*ones)[3] = alb_allocate(scatter->patch_count, sizeof *ones, error);
     if (!ones)
         return false;
@@ -308,9 +307,20 @@ static bool find_sums(alb_scatter *scatter, alb_error *error)
         for (int c = 0; c < 3; c++)
             ones[i][c] = 1;
     alb_scatter_apply(scatter->row_sums, scatter, (const double(*)[3])ones);
-    memcpy(scatter->column_sums, scatter->local, scatter->patch_count * sizeof *scatter->local);
+    scatter->columns_known = false;
     free(ones);
-    return alb_product_add_columns(scatter->column_sums, &p->links, &p->forest, p->kernels, error);
+    return true;
+}
+
+// The transposed product with the areas.
+bool alb_scatter_sum_columns(alb_scatter *scatter, alb_error *error)
+{
+    alb_scatter_parts *p = scatter->parts;
+    if (scatter->columns_known)
+        return true;
+    memcpy(scatter->column_sums, scatter->local, scatter->patch_count * sizeof *scatter->local);
+    return scatter->columns_known =
+               alb_product_add_columns(scatter->column_sums, &p->links, &p->forest, p->kernels, error);
 }
 
 bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_error *error)
@@ -322,7 +332,7 @@ bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_
         alb_scatter_kernel_write(&p->kernels[k], surfaces[p->kernels[k].surface].profiles[p->kernels[k].side]);
     alb_product_write_pairs(&p->links, p->kernels);
     write_local(scatter, surfaces);
-    return find_sums(scatter, error);
+    return sum_rows(scatter, error);
 }
 
 void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3])

@@ -32,6 +32,7 @@ typedef struct alb_scatter {
     // Sum over sources i of S'_ji, what patch j sends out of even light; and the share of the flux into patch i that
     // leaves again anywhere, sum_j A_j S'_ji / A_i: the energy balance's own row.
     double (*row_sums)[3], (*column_sums)[3];
+    bool columns_known; // the column sums are those of the profiles as they are
     alb_scatter_body *bodies;
     size_t body_count;
     size_t link_count;        // an exit patch and a cluster, a patch or a part of a patch that lights it
@@ -43,10 +44,12 @@ typedef struct alb_scatter {
 bool alb_scatter_create(alb_scatter *scatter, const alb_patches *patches, const uint16_t *materials,
                         const alb_surface *surfaces, double error_wanted, alb_error *error);
 void alb_scatter_free(alb_scatter *scatter);
-// The same bodies with other profiles or reflectances: tables, self-terms and sums anew, the links stay. Their error
-// holds for profiles as wide as those of the creation or wider; with narrower ones it grows as the ratio squared.
+// The same bodies with other profiles or reflectances: tables, self-terms and row sums anew, the links stay. Their
+// error holds for profiles as wide as those of the creation or wider; with narrower ones it grows as the ratio squared.
 // ALB_BAD_DATA where a surface scatters that was opaque or the other way round, or became a slab: create anew.
 bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_error *error);
+// The column sums after a rewrite, which leaves them as they were; nothing to do where they are known.
+bool alb_scatter_sum_columns(alb_scatter *scatter, alb_error *error);
 // out = S' irradiance, RGB; out and irradiance have patch_count rows and are not the same.
 void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
 // The part of S' irradiance that crossed a slab or a sheet: zero elsewhere. Same rows.

@@ -4,8 +4,8 @@
 //     in = sum A (E + M),  absorbed = sum A (1 - kappa) H,  escaped = sum A B (share of sky rays), lost likewise for
 //     backs
 // What changed and what stays: rays know the meshes alone, scattering the meshes and materials, the solve everything.
-// A solution that is already there is the start of the next where the direct light has changed by little: it costs a
-// product, and each product gains a factor of five to ten.
+// A solution that is already there is the start of the next where the direct light has changed by so little that
+// clusters would come no nearer.
 #include "render/solution.h"
 #include "base/memory.h"
 #include "base/progress.h"
@@ -16,8 +16,8 @@
 
 const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "lights", "scattering", "solve"};
 
-// A change of the direct light, |E - E'| / |E|, below which the last solution is worth a product as a start.
-static const double small_change = 0.05;
+// A change of the direct light, |E - E'| / |E|, below which the last solution is the better start.
+static const double small_change = 0.005;
 static const double scatter_error = 0.005; // relative, of what even light sends out
 static const alb_solver default_solver = ALB_SOLVER_TWO_LEVEL;
 
@@ -158,6 +158,8 @@ static void sky_radiosity(double sky[3], const alb_scene *scene)
 static bool take_stock(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
     double sky[3];
+    if (!alb_scatter_sum_columns(&s->scatter, error))
+        return false;
     sky_radiosity(sky, scene);
     s->bound = alb_radiosity_bound(&s->equations, &s->report, (const double(*)[3])s->radiosity);
     if (!alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, sky, error))
@@ -212,7 +214,8 @@ static double change_of(const alb_solution *s, const double (*before)[3])
     return all > 0 ? change / all : 0;
 }
 
-bool alb_solution_relight(alb_solution *s, const alb_scene *scene, alb_error *error)
+// same: the materials are those of the solution as it stands.
+static bool relight(alb_solution *s, const alb_scene *scene, bool same, alb_error *error)
 {
     const size_t n = s->patches.count;
     double(*before)[3] = alb_allocate(n, sizeof *before, error);
@@ -223,13 +226,18 @@ bool alb_solution_relight(alb_solution *s, const alb_scene *scene, alb_error *er
     add_lamps(s, -1);
     bool ok = light_patches(s, scene, error);
     const double lit_s = alb_clock_s();
-    ok = ok && solve(s, scene, change_of(s, (const double(*)[3])before) < small_change * small_change, error) &&
-         take_stock(s, scene, error);
+    const bool near = same && change_of(s, (const double(*)[3])before) < small_change * small_change;
+    ok = ok && solve(s, scene, near, error) && take_stock(s, scene, error);
     add_lamps(s, ok ? 1 : 0);
     s->seconds[ALB_STAGE_LIGHTS] = lit_s - start_s;
     s->seconds[ALB_STAGE_SOLVE] = alb_clock_s() - lit_s;
     free(before);
     return ok;
+}
+
+bool alb_solution_relight(alb_solution *s, const alb_scene *scene, alb_error *error)
+{
+    return relight(s, scene, true, error);
 }
 
 bool alb_solution_rematerial(alb_solution *s, const alb_scene *scene, alb_error *error)
@@ -239,7 +247,7 @@ bool alb_solution_rematerial(alb_solution *s, const alb_scene *scene, alb_error 
     s->seconds[ALB_STAGE_SCATTERING] = alb_clock_s() - start_s;
     if (ok)
         alb_radiosity_refresh(&s->equations);
-    return ok && alb_solution_relight(s, scene, error);
+    return ok && relight(s, scene, false, error);
 }
 
 static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, alb_error *error)

@@ -159,8 +159,7 @@ static bool chart(const bench *b, const char *path, alb_error *error)
                                 .y = b->error_percent[k],
                                 .count = k ? RANKS : RESIDUALS,
                                 .mark = ALB_MARK_LINE_AND_POINTS};
-    const alb_panel panel = {.title = "Relighting fixed materials: error of radiosity against time "
-                                      "(residuals 1e-1 to 1e-4; 16, 48, 128 columns; 8, 16, 32)",
+    const alb_panel panel = {.title = "Relighting fixed materials: error of the radiosity against time",
                              .x_label = "seconds a relight",
                              .y_label = "error, %, rms over four lights",
                              .log_x = true,

@@ -18,11 +18,11 @@
 #include <string.h>
 #include <time.h>
 
-enum { WAYS = 9, RAYS = 4, CHECKED = 3, SHADE = 160 };
+enum { WAYS = 10, RAYS = 4, CHECKED = 3, SHADE = 160 };
 
 static const struct {
     const char *name;
-    enum { FIELDS, PAPER, REGRESSED, TRANSPORT, FULL } kind;
+    enum { FIELDS, PAPER, REGRESSED, PROBES, TRANSPORT, FULL } kind;
     int order, outer, inner, cells, pixels;
     double cluster;
 } ways[WAYS] = {{"as printed", PAPER, 4, 1, 0, 8, 32, 0},
@@ -32,6 +32,7 @@ static const struct {
                 {"2 shells", FIELDS, 4, 2, 0, 8, 64, 0.04},
                 {"4 shells", FIELDS, 4, 1, 2, 8, 64, 0.04},
                 {"4 shells, order 8", FIELDS, 8, 1, 2, 12, 64, 0.02},
+                {"probes", PROBES, 4, 1, 0, 8, 64, 0.04},
                 {"transport", TRANSPORT, 4, 1, 0, 8, 64, 0.04},
                 {"16 shells", FULL, 4, 1, 0, 8, 64, 0.04}};
 #define BOTTOM 0.3 // percent, of the chart
@@ -65,6 +66,8 @@ static alb_shadow_stage stage_of(int way)
     stage.settings.cells = ways[way].cells;
     stage.settings.pixels = ways[way].pixels;
     stage.settings.cluster = ways[way].cluster;
+    if (ways[way].kind != PROBES)
+        stage.settings.probes = 0;
     return stage;
 }
 
@@ -224,7 +227,7 @@ typedef struct figures {
 static bool chart(const char *path, const figures *f, alb_error *error)
 {
     static const char *const colours[WAYS] = {"#d62728", "#1f77b4", "#17becf", "#9467bd", "#2ca02c",
-                                              "#8c564b", "#e377c2", "#000",    "#ff7f0e"};
+                                              "#8c564b", "#e377c2", "#bcbd22", "#000",    "#ff7f0e"};
     static double shade_x[SHADOW_SCENES][2 * SHADE], shade_y[SHADOW_SCENES][2 * SHADE], twice[SHADOW_SCENES][WAYS][2];
     alb_curve curves[SHADOW_SCENES][WAYS + 3];
     alb_panel panels[SHADOW_SCENES];
@@ -291,7 +294,7 @@ static bool draw_frames(const char *chart_path, alb_error *error)
     for (int i = 0; ok && i < SHADOW_SCENES; i++) {
         alb_scene scene;
         alb_image picture = {0};
-        alb_shadow_stage stage = stage_of(5); // with transport where a scene has rigid objects
+        alb_shadow_stage stage = stage_of(WAYS - 1); // with transport where a scene has rigid objects
         double brightest, exposure;
         if (!shadow_scenes[i].create(&scene, 12, error))
             break;

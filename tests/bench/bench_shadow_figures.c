@@ -231,6 +231,7 @@ static bool write_full(const char *folder, const model *m, const alb_scene *scen
     static shadow_full full;
     pictures p = {0};
     alb_shadow_stage stage = {.settings = alb_shadow_defaults};
+    stage.settings.probes = 0;
     const size_t n = scene->mesh.vertex_count;
     float(*black)[3] = calloc(scene->mesh.face_count, sizeof *black);
     bool ok = black && (p.truth = calloc(n, sizeof *p.truth)) && alb_shadow_stage_light(&stage, scene, error) &&
@@ -251,6 +252,7 @@ static bool write_full(const char *folder, const model *m, const alb_scene *scen
         static const char *const names[3] = {"1 shell, as printed", "1 shell", "4 shells"};
         alb_shadow_stage_free(&stage);
         stage = (alb_shadow_stage){.settings = alb_shadow_defaults, .paper = !k};
+        stage.settings.probes = 0; // fields alone
         stage.settings.inner = k == 2 ? 2 : 0, stage.settings.far = k == 2;
         ok = alb_shadow_stage_light(&stage, scene, error) && show(&p, 2 + k, names[k], scene, &stage, error);
     }
