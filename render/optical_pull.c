@@ -41,7 +41,7 @@ static bool pull(alb_bends *path, const alb_optical_solid *solid, int first, int
         const alb_vector at = alb_sub(path->at[i], chord.from);
         towards = alb_add(towards, alb_sub(at, alb_times(alb_dot(at, chord.along), chord.along)));
     }
-    if (!(turn ? alb_slice_best(&section, solid, &chord, towards)
+    if (!(turn ? alb_slice_best(&section, solid, &chord, towards, true)
                : alb_slice(&section, solid, &chord, towards, so_far)) ||
         !(section.length_mm < so_far))
         return false;

@@ -4,7 +4,7 @@
 // 1972).
 #include "render/optical_section.h"
 
-enum { STEPS = 64 };
+enum { STEPS = 64, LOOKS = 4 };
 
 typedef struct corner {
     double x, y, height; // above the plane
@@ -74,17 +74,20 @@ static int entry_of(const alb_chord *chord, uint32_t triangle)
     return -1;
 }
 
-int alb_section_follow(alb_cut *cuts, int *cut_count, int most, int curve, const alb_surface_net *net,
-                       const alb_section_plane *plane, const alb_chord *chord, size_t first)
+static double norm(double x, double y) { return sqrt(x * x + y * y); }
+
+int alb_section_follow(alb_cut *cuts, int *cut_count, int curve, const alb_surface_net *net,
+                       const alb_section_plane *plane, const alb_chord *chord, size_t first, double most_mm)
 {
     const double near = 1e-6 * net->edge_mm; // cuts above are not beside the chord
     gate g;
     if (!leave(&g, plane, net, chord->crossings[first].triangle, true))
         return -1;
-    for (alb_cut cut = cut_at(&g); *cut_count < most;) {
+    for (alb_cut cut = cut_at(&g); *cut_count < ALB_CUTS_MAX;) {
         cut.order = *cut_count + curve;
         cuts[(*cut_count)++] = cut;
-        if (g.across == UINT32_MAX)
+        if (g.across == UINT32_MAX ||
+            (*cut_count % LOOKS == 0 && norm(cut.x, cut.y) + norm(chord->length_mm - cut.x, cut.y) > most_mm))
             return -1;
         const uint32_t triangle = g.across / 3;
         step(&g, plane, net);
@@ -142,8 +145,6 @@ int alb_section_tighten(alb_cut *cuts, int count, double length)
     }
     return kept;
 }
-
-static double norm(double x, double y) { return sqrt(x * x + y * y); }
 
 static double taut_length(const alb_cut *hull, int kept, double length)
 {

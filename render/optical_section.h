@@ -3,6 +3,8 @@
 #pragma once
 #include "render/optical_solid.h"
 
+enum { ALB_CUTS_MAX = 1024 };
+
 typedef struct alb_section_plane {
     alb_vector origin, along, up, normal;
 } alb_section_plane;
@@ -17,8 +19,9 @@ typedef struct alb_cut {
 // The plane through the line that holds `towards`; up is zero where that lies on the line.
 alb_section_plane alb_section_through(alb_vector origin, alb_vector along, alb_vector towards);
 // Follows the curve (its number for the order) upwards from where the chord leaves, by crossing `first`, until it is
-// back at the chord, and adds its cuts, at most `most` in all. The crossing by which it returns; -1 where it does not.
-int alb_section_follow(alb_cut *cuts, int *cut_count, int most, int curve, const alb_surface_net *net,
-                       const alb_section_plane *plane, const alb_chord *chord, size_t first);
+// back at the chord, and adds its cuts, at most ALB_CUTS_MAX in all. The crossing by which it returns; -1 where it does
+// not, or where a string about it is seen to be longer than most_mm.
+int alb_section_follow(alb_cut *cuts, int *cut_count, int curve, const alb_surface_net *net,
+                       const alb_section_plane *plane, const alb_chord *chord, size_t first, double most_mm);
 // The string from (0, 0) over the cuts to (length, 0): those it touches, in place; how many.
 int alb_section_tighten(alb_cut *cuts, int count, double length);

@@ -100,7 +100,7 @@ static void go_around(alb_bends *path, alb_search *search, const alb_optical_sol
     alb_bends other;
     alb_vector towards;
     path->count = 2, path->at[0] = chord->from, path->at[1] = chord->to;
-    if (!(alb_slice_direction(&towards, solid, chord) && alb_slice_best(path, solid, chord, towards)) &&
+    if (!(alb_slice_direction(&towards, solid, chord) && alb_slice_best(path, solid, chord, towards, false)) &&
         !alb_slice_any(path, solid, chord))
         path->length_mm = (double)INFINITY;
     if (path->length_mm <= trusted_detour * chord->length_mm ||

@@ -7,7 +7,8 @@
 
 enum { ALB_BENDS_MAX = 128, ALB_CROSSINGS_MAX = 48 };
 
-// A triangle entered across one of its edges: the corner that is not on it, and what lies across the edges before and after.
+// A triangle entered across one of its edges: the corner that is not on it, and what lies across the edges before and
+// after.
 typedef struct alb_door {
     alb_vector third;
     uint32_t across[2]; // 3 * triangle + edge there; UINT32_MAX: none
@@ -86,11 +87,14 @@ typedef struct alb_chord {
 alb_chord alb_chord_between(const alb_optical_solid *solid, alb_vector from, alb_vector to);
 // The shortest path from end to end of the chord in the half plane through it that `towards` points into, along the
 // surface where the chord leaves the body. False where the surface does not lead back to the chord, or leads through
-// another part of the outside; the latter is looked for only where the path is shorter than most_mm.
+// another part of the outside; the latter is looked for only where the path is shorter than most_mm. False, too, where
+// it is longer than twice that, or than the reach by a fifth.
 bool alb_slice(alb_bends *bends, const alb_optical_solid *solid, const alb_chord *chord, alb_vector towards,
                double most_mm);
-// The same in the best of the half planes turned from that one by up to about half a radian.
-bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, const alb_chord *chord, alb_vector towards);
+// The same in the best of the half planes turned from that one by up to about half a radian; beside: also where that
+// one leads nowhere.
+bool alb_slice_best(alb_bends *bends, const alb_optical_solid *solid, const alb_chord *chord, alb_vector towards,
+                    bool beside);
 // The best of half planes all around the chord.
 bool alb_slice_any(alb_bends *bends, const alb_optical_solid *solid, const alb_chord *chord);
 // Which half plane the surface where the chord leaves and returns speaks for; false where it does not.

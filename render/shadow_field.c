@@ -14,7 +14,7 @@
 #include <string.h>
 
 const alb_shadow_settings alb_shadow_defaults = {
-    .order = 4, .cells = 8, .pixels = 64, .distance = 1.1, .outer = 1, .rays = 512, .cluster = 0.04};
+    .order = 4, .cells = 8, .pixels = 64, .distance = 1.1, .outer = 1, .rays = 512, .probes = 1200, .cluster = 0.04};
 const alb_shadow_settings alb_shadow_light_settings = {
     .order = 4, .cells = 8, .pixels = 40, .distance = 1.1, .outer = 6};
 // Radii of 1, 2, 3 inner shells from outside inwards; of the outer ones over the first one's; of the far one.
@@ -62,14 +62,15 @@ static bool check(const alb_shadow_settings *s, bool shines, const char *name, a
 {
     if (s->order < 2 || s->order > ALB_SH_ORDER_MAX || s->cells < 1 || s->cells > ALB_SHADOW_CELLS_MAX ||
         s->outer < 1 || s->outer > ALB_SHADOW_OUTER_MAX || s->inner < 0 || s->inner > ALB_SHADOW_INNER_MAX ||
-        (s->inner && (s->rays < 16 || s->rays > 65536)) || !(s->cluster >= 0 && s->cluster <= 0.5))
+        (s->inner && (s->rays < 16 || s->rays > 65536)) || s->probes < 0 || s->probes > ALB_SHADOW_PROBES_MAX ||
+        !(s->cluster >= 0 && s->cluster <= 0.5))
         return alb_fail(
             error, ALB_BAD_DATA,
-            "%s: a shadow field of order %d with %d cells, %d shells outside, %d inside of %d rays, clusters of %g "
-            "radii: orders 2 to %d, cells 1 to %d, 1 to %d shells outside, up to %d inside of 16 to 65536 rays, "
-            "clusters to 0.5 exist",
-            name, s->order, s->cells, s->outer, s->inner, s->rays, s->cluster, ALB_SH_ORDER_MAX, ALB_SHADOW_CELLS_MAX,
-            ALB_SHADOW_OUTER_MAX, ALB_SHADOW_INNER_MAX);
+            "%s: a shadow field of order %d with %d cells, %d shells outside, %d inside of %d rays, %d probes, clusters of "
+            "%g radii: orders 2 to %d, cells 1 to %d, 1 to %d shells outside, up to %d inside of 16 to 65536 rays, up "
+            "to %d probes, clusters to 0.5 exist",
+            name, s->order, s->cells, s->outer, s->inner, s->rays, s->probes, s->cluster, ALB_SH_ORDER_MAX, ALB_SHADOW_CELLS_MAX,
+            ALB_SHADOW_OUTER_MAX, ALB_SHADOW_INNER_MAX, ALB_SHADOW_PROBES_MAX);
     if (s->far && !(s->distance * outer_ratios[s->outer - 1] < far_radius))
         return alb_fail(error, ALB_BAD_DATA, "%s: %d shells outside from %g radii on reach the far one at %g", name,
                         s->outer, s->distance, far_radius);

@@ -13,10 +13,12 @@ enum {
     ALB_SHADOW_INNER_MAX = 3,
     ALB_SHADOW_OUTER_MAX = 6,
     ALB_SHADOW_SHELLS_MAX = ALB_SHADOW_INNER_MAX + ALB_SHADOW_OUTER_MAX + 1,
+    ALB_SHADOW_PROBES_MAX = 4096,
     ALB_SHADOW_FAR_ORDER = 6, // of the far shell and its grid: far away an object is small, finer bands of it matter
     ALB_SHADOW_FAR_CELLS = 5  // more than nodes do; together as many numbers as order 4 with 8 cells
 };
 
+// Fields know of probes only that their number is within bounds: who lights with fields makes the surfaces.
 typedef struct alb_shadow_settings {
     int order;       // of the samples, 2 to ALB_SH_ORDER_MAX; receivers get order 4
     int cells;       // of the grid, a side of a cube's face
@@ -26,9 +28,10 @@ typedef struct alb_shadow_settings {
     int inner;       // shells inside, 0 to ALB_SHADOW_INNER_MAX; occlusion only
     bool far;        // one more at 2.9 radii, beyond the others, of ALB_SHADOW_FAR_ORDER; occlusion only
     int rays;        // from each inner node
+    int probes;      // on the object's own surface (shadow_surface.h), 0 to ALB_SHADOW_PROBES_MAX; occlusion only
     double cluster;  // vertices within about so many radii move as one in pictures from outside; 0: each for itself
 } alb_shadow_settings;
-// Order 4, 8 cells, 64 pixels, one shell at 1.1 radii, none inside or far, 512 rays, 0.04.
+// Order 4, 8 cells, 64 pixels, one shell at 1.1 radii, none inside or far, 512 rays, 1200 probes, 0.04.
 extern const alb_shadow_settings alb_shadow_defaults;
 // Six shells and 40 pixels: what a light shows of itself changes with the distance more than a silhouette does.
 extern const alb_shadow_settings alb_shadow_light_settings;

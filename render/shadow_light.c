@@ -36,6 +36,8 @@ typedef struct block {
     float cosine[VALUES * BLOCK];                         // max(0, n.d)
     float lobe[ALB_SH_COUNT_MAX * BLOCK];                 // the same, or precomputed transport: what skies light
     bool in_body[BLOCK], coloured;                        // receivers with transport; if the colours' lobes differ
+    size_t own[BLOCK];                                    // occluder on whose probed surface a receiver lies, or none
+    float hidden[VALUES * BLOCK];                         // by it, of the cosine
     double distances_mm[ALB_SHADOW_OCCLUDERS_MAX][BLOCK]; // to the occluders' centres
     float shares[ALB_SHADOW_OCCLUDERS_MAX][BLOCK];        // of the occlusion that is above the horizon
     bool hides[ALB_SHADOW_OCCLUDERS_MAX];                 // any of the shares is not 0
@@ -64,6 +66,23 @@ static void set_lobes(block *b, const alb_shadow_world *world)
         world->transport && alb_shadow_transport_lobes(b->lobe, b->in_body, world->transport, 0, b->first, b->count);
 }
 
+static void find_own(block *b, const alb_shadow_world *world)
+{
+    for (size_t r = 0; r < b->count; r++)
+        b->own[r] = SIZE_MAX;
+    for (size_t o = 0; world->surfaces && o < world->occluder_count; o++) {
+        const alb_shadow_surface *surface = &world->surfaces[o];
+        for (size_t r = 0; r < b->count; r++) {
+            const size_t v = b->first + r - world->first_vertices[o];
+            if (!surface->probe_count || v >= surface->mesh.vertex_count)
+                continue;
+            b->own[r] = o;
+            for (size_t i = 0; i < VALUES; i++)
+                b->hidden[i * BLOCK + r] = surface->hidden[v][i];
+        }
+    }
+}
+
 // Where receivers look the field up: from within its sphere a tenth of the radius above their surface, for the nodes
 // around lie partly below it, where all is dark.
 static void look_up_above(alb_vector *points, const block *b, const alb_shadow_sphere *sphere)
@@ -75,10 +94,10 @@ static void look_up_above(alb_vector *points, const block *b, const alb_shadow_s
     }
 }
 
-// Transport knows what the body hides of the skies from itself.
+// Transport knows what the body hides of the skies from itself, probes what an object does of anything.
 static bool counts(const block *b, const alb_shadow_world *world, size_t occluder, size_t receiver, bool sky)
 {
-    return !(sky && b->in_body[receiver] && world->of_body[occluder]);
+    return b->own[receiver] != occluder && !(sky && b->in_body[receiver] && world->of_body[occluder]);
 }
 
 static void find_occlusions(block *b, const alb_shadow_world *world)
@@ -145,6 +164,21 @@ static void set_lobe(float *out, const block *b, const alb_shadow_sphere *light)
     }
 }
 
+// out -= what a receiver's own object hides of the cosine.
+static void take_hidden(float *out, const block *b, const alb_shadow_world *world, const alb_shadow_sphere *light,
+                        const double *light_mm)
+{
+    for (size_t r = 0; r < b->count; r++) {
+        const size_t o = b->own[r];
+        if (o == SIZE_MAX || (!light && b->in_body[r]))
+            continue;
+        const double share =
+            light ? share_before(&world->occluders[o].sphere, light, b->distances_mm[o][r], light_mm[r]) : 1;
+        for (size_t i = 0; i < VALUES; i++)
+            out[i * BLOCK + r] -= (float)share * b->hidden[i * BLOCK + r];
+    }
+}
+
 // P: the cosine through all occluders; light NULL: a sky.
 static void find_transfer(float *out, const block *b, const alb_shadow_world *world, const alb_shadow_sphere *light,
                           const double *light_mm)
@@ -153,6 +187,7 @@ static void find_transfer(float *out, const block *b, const alb_shadow_world *wo
     float visible[VALUES * BLOCK];
     const size_t stages = sort_occluders(order, b, world->occluder_count);
     set_lobe(out, b, light);
+    take_hidden(out, b, world, light, light_mm);
     for (size_t s = 0; s < stages; s++) {
         for (size_t r = 0; r < b->count; r++) {
             const size_t o = order[s][r];
@@ -261,6 +296,7 @@ static void light_block(float (*irradiance)[3], block *b, const alb_shadow_world
     memset(irradiance, 0, b->count * sizeof *irradiance);
     const double start_s = alb_clock_s();
     set_lobes(b, world);
+    find_own(b, world);
     find_occlusions(b, world);
     const double found_s = alb_clock_s();
     for (size_t j = 0; j < world->light_count; j++)

@@ -3,6 +3,7 @@
 #include "render/shadow_field.h"
 #include "render/shadow_laws.h"
 #include "render/shadow_sky.h"
+#include "render/shadow_surface.h"
 #include "render/shadow_transport.h"
 
 enum { ALB_SHADOW_OCCLUDERS_MAX = 64 };
@@ -15,6 +16,8 @@ typedef struct alb_shadow_world {
     const alb_shadow_laws *laws;
     const alb_shadow_transport *transport; // NULL: none; else receivers are the vertices it was made for
     const bool *of_body;                   // whether each occluder belongs to its body
+    const alb_shadow_surface *surfaces;    // NULL: none; else of each occluder, without probes where it has none
+    const size_t *first_vertices;          // of each occluder with a surface, among the receivers
 } alb_shadow_world;
 
 // Seconds summed over threads: looking up and scaling of samples; products with all that follows.

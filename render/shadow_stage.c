@@ -49,11 +49,18 @@ static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o,
     if (light)
         settings = alb_shadow_light_settings;
     stage->objects[index] = o;
+    stage->first_vertices[index] = scene->objects[o].first_vertex;
     snprintf(stage->names[index], sizeof *stage->names, "object %zu", o);
     stage->of_body[index] = scene->objects[o].rigid && !light;
-    const bool ok = cut_out(&mesh, &radiance, scene, &scene->objects[o], error) &&
-                    alb_shadow_field_create(&stage->fields[index], &settings, &mesh,
-                                            light ? (const float(*)[3])radiance : NULL, stage->names[index], error);
+    const bool ok =
+        cut_out(&mesh, &radiance, scene, &scene->objects[o], error) &&
+        alb_shadow_field_create(&stage->fields[index], &settings, &mesh, light ? (const float(*)[3])radiance : NULL,
+                                stage->names[index], error) &&
+        (light || !settings.probes ||
+         alb_shadow_surface_create(&stage->surfaces[index], &mesh, stage->normals + scene->objects[o].first_vertex,
+                                   (size_t)settings.probes, error));
+    if (!ok)
+        alb_shadow_field_free(&stage->fields[index]);
     *(light ? &stage->light_count : &stage->occluder_count) += ok;
     free(radiance);
     alb_mesh_free(&mesh);
@@ -81,6 +88,10 @@ static void free_fields(alb_shadow_stage *stage)
     free(stage->groups);
     free(stage->normals);
     free(stage->irradiance);
+    for (size_t i = 0; stage->surfaces && i < stage->occluder_count; i++)
+        alb_shadow_surface_free(&stage->surfaces[i]);
+    free(stage->surfaces);
+    free(stage->first_vertices);
     free(stage->of_body);
     alb_shadow_transport_free(&stage->transport);
     const alb_shadow_stage kept = *stage;
@@ -130,10 +141,8 @@ static bool create_transport(alb_shadow_stage *stage, const alb_scene *scene, co
     bool *of_body = alb_allocate(scene->object_count, sizeof *of_body, error), any = false, ok = of_body;
     for (size_t o = 0; ok && o < scene->object_count; o++)
         any |= of_body[o] = scene->objects[o].rigid && !shines[o] && stage->sky_count;
-    if (any) {
-        set_normals(stage->normals, &scene->mesh);
+    if (any)
         ok = alb_shadow_transport_create(&stage->transport, scene, of_body, stage->normals, error);
-    }
     stage->transport_s = alb_clock_s() - start_s;
     free(of_body);
     return ok;
@@ -148,11 +157,15 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
               (stage->objects = alb_allocate(n, sizeof *stage->objects, error)) &&
               (stage->names = alb_allocate(n, sizeof *stage->names, error)) &&
               (stage->of_body = alb_allocate(n, sizeof *stage->of_body, error)) &&
+              (stage->surfaces = alb_allocate(n, sizeof *stage->surfaces, error)) &&
+              (stage->first_vertices = alb_allocate(n, sizeof *stage->first_vertices, error)) &&
               (stage->faces = alb_allocate(mesh->face_count, sizeof *stage->faces, error)) &&
               (stage->groups = alb_allocate(mesh->face_count, sizeof *stage->groups, error)) &&
               (stage->normals = alb_allocate(mesh->vertex_count, sizeof *stage->normals, error)) &&
               (stage->irradiance = alb_allocate(mesh->vertex_count, sizeof *stage->irradiance, error)) &&
               find_lights(&shines, scene, error);
+    if (ok)
+        set_normals(stage->normals, mesh);
     for (int light = 0; light < 2; light++) // occluders first
         for (size_t o = 0; ok && o < n; o++)
             if (shines[o] == (light == 1) && (light || !scene->objects[o].receives_only))
@@ -211,7 +224,9 @@ alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage)
                               .sky_count = stage->sky_count,
                               .laws = &stage->laws,
                               .transport = stage->transport.row_count ? &stage->transport : NULL,
-                              .of_body = stage->of_body};
+                              .of_body = stage->of_body,
+                              .surfaces = stage->settings.probes ? stage->surfaces : NULL,
+                              .first_vertices = stage->first_vertices};
 }
 
 bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
@@ -228,13 +243,18 @@ bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb
     if (ok && !stage->light_count && !stage->sky_count)
         ok = alb_fail(error, ALB_BAD_DATA, "there is no light: no environment and no object that emits");
     ok = ok && alb_shadow_transport_follow(&stage->transport, mesh->vertices, error);
+    if (ok)
+        set_normals(stage->normals, mesh);
     for (size_t i = 0; ok && i < stage->occluder_count + stage->light_count; i++)
         ok = alb_shadow_field_sample(&stage->fields[i], mesh->vertices + scene->objects[stage->objects[i]].first_vertex,
                                      error);
+    for (size_t i = 0; ok && stage->settings.probes && i < stage->occluder_count; i++)
+        if (stage->light_count || !stage->of_body[i]) // skies have the transport of what is rigid
+            ok = alb_shadow_surface_sample(&stage->surfaces[i], mesh->vertices + stage->first_vertices[i],
+                                           stage->normals + stage->first_vertices[i], error);
     const double sampled_s = alb_clock_s();
     if (ok) {
         const alb_shadow_world world = alb_shadow_stage_world(stage);
-        set_normals(stage->normals, mesh);
         stage->seconds = (alb_shadow_seconds){0};
         ok = alb_shadow_irradiance(stage->irradiance, &world, mesh->vertices, stage->normals, mesh->vertex_count,
                                    &stage->seconds, error);

@@ -15,6 +15,8 @@ typedef struct alb_shadow_stage {
     size_t occluder_count, light_count;
     alb_shadow_transport transport; // of what is rigid, for the skies
     bool *of_body;                  // whether each occluder is part of it
+    alb_shadow_surface *surfaces;   // of the occluders, if settings have probes
+    size_t *first_vertices;         // of each occluder
     alb_shadow_sky *skies;
     size_t sky_count;
     alb_shadow_laws laws;

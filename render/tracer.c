@@ -54,11 +54,11 @@ static bool count_bytes(void *user, ssize_t bytes, bool post)
 }
 
 // Middle and half extent of the vertices; those that are not finite are left out.
-static void find_bounds(alb_tracer *tracer, const alb_mesh *mesh)
+static void find_bounds(alb_tracer *tracer, const alb_vector *vertices, size_t count)
 {
     alb_vector low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < mesh->vertex_count; i++) {
-        const alb_vector v = mesh->vertices[i];
+    for (size_t i = 0; i < count; i++) {
+        const alb_vector v = vertices[i];
         if (!isfinite(v.x + v.y + v.z))
             continue;
         low = (alb_vector){fmin(low.x, v.x), fmin(low.y, v.y), fmin(low.z, v.z)};
@@ -71,6 +71,16 @@ static void find_bounds(alb_tracer *tracer, const alb_mesh *mesh)
     tracer->slack_mm = 64 * 0x1p-24 * fmax(half.x, fmax(half.y, half.z));
 }
 
+static void place(float *out, const alb_vector *vertices, size_t count, alb_vector middle)
+{
+    for (size_t i = 0; i < count; i++) {
+        const alb_vector v = alb_sub(vertices[i], middle);
+        out[3 * i] = (float)v.x;
+        out[3 * i + 1] = (float)v.y;
+        out[3 * i + 2] = (float)v.z;
+    }
+}
+
 static bool fill(RTCGeometry geometry, const alb_mesh *mesh, alb_vector centre)
 {
     float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
@@ -79,22 +89,17 @@ static bool fill(RTCGeometry geometry, const alb_mesh *mesh, alb_vector centre)
                                               3 * sizeof(uint32_t), mesh->face_count);
     if (!vertices || !faces)
         return false;
-    for (size_t i = 0; i < mesh->vertex_count; i++) {
-        const alb_vector v = alb_sub(mesh->vertices[i], centre);
-        vertices[3 * i] = (float)v.x;
-        vertices[3 * i + 1] = (float)v.y;
-        vertices[3 * i + 2] = (float)v.z;
-    }
+    place(vertices, mesh->vertices, mesh->vertex_count, centre);
     for (size_t i = 0; i < mesh->face_count; i++)
         for (size_t k = 0; k < 3; k++)
             faces[3 * i + k] = mesh->faces[i][k];
     return true;
 }
 
-bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *error)
+static bool create(alb_tracer *tracer, const alb_mesh *mesh, bool moves, alb_error *error)
 {
     *tracer = (alb_tracer){0};
-    RTCDevice device = rtcNewDevice(NULL);
+    RTCDevice device = rtcNewDevice(moves ? "threads=1" : NULL); // waking threads takes longer than a small mesh
     if (!device) {
         const enum RTCError code = rtcGetDeviceError(NULL);
         return alb_fail(error, code == RTC_ERROR_OUT_OF_MEMORY ? ALB_NO_MEMORY : ALB_INTERNAL,
@@ -105,14 +110,17 @@ bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *erro
     RTCScene scene = rtcNewScene(device);
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     tracer->scene = scene;
-    find_bounds(tracer, mesh);
+    find_bounds(tracer, mesh->vertices, mesh->vertex_count);
     bool ok = scene && geometry && (!mesh->face_count || fill(geometry, mesh, tracer->middle));
     if (ok) {
-        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | FILTERED);
-        rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | FILTERED | (moves ? RTC_SCENE_FLAG_DYNAMIC : 0));
+        rtcSetSceneBuildQuality(scene, moves ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_HIGH);
+        if (moves)
+            rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_LOW);
         if (mesh->face_count) {
             rtcCommitGeometry(geometry);
-            rtcAttachGeometry(scene, geometry);
+            rtcAttachGeometry(scene, geometry); // which keeps it alive
+            tracer->geometry = geometry;
         }
         rtcCommitScene(scene);
     }
@@ -124,6 +132,31 @@ bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *erro
     alb_tracer_free(tracer);
     return alb_fail(error, code == RTC_ERROR_OUT_OF_MEMORY ? ALB_NO_MEMORY : ALB_INTERNAL,
                     "Embree: cannot build the scene of %zu triangles (error %d)", mesh->face_count, (int)code);
+}
+
+bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *error)
+{
+    return create(tracer, mesh, false, error);
+}
+
+bool alb_tracer_create_moving(alb_tracer *tracer, const alb_mesh *mesh, alb_error *error)
+{
+    return create(tracer, mesh, true, error);
+}
+
+bool alb_tracer_move(alb_tracer *tracer, const alb_vector *vertices, size_t count, alb_error *error)
+{
+    RTCGeometry geometry = tracer->geometry;
+    if (geometry) {
+        find_bounds(tracer, vertices, count);
+        place(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_VERTEX, 0), vertices, count, tracer->middle);
+        rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+        rtcCommitGeometry(geometry);
+        rtcCommitScene(tracer->scene);
+    }
+    const enum RTCError code = rtcGetDeviceError(tracer->device);
+    return code == RTC_ERROR_NONE || alb_fail(error, code == RTC_ERROR_OUT_OF_MEMORY ? ALB_NO_MEMORY : ALB_INTERNAL,
+                                              "Embree: cannot move %zu vertices (error %d)", count, (int)code);
 }
 
 void alb_tracer_free(alb_tracer *tracer)

@@ -3,10 +3,10 @@
 #include "render/mesh.h"
 
 typedef struct alb_tracer {
-    void *device, *scene; // Embree handles
-    int64_t bytes;        // memory Embree holds; its own count
-    alb_vector middle;    // of the mesh's bounds: Embree's origin
-    double slack_mm;      // nearer than this along a ray two surfaces may come in either order
+    void *device, *scene, *geometry; // Embree handles; geometry NULL: no faces
+    int64_t bytes;                   // memory Embree holds; its own count
+    alb_vector middle;               // of the mesh's bounds: Embree's origin
+    double slack_mm;                 // nearer than this along a ray two surfaces may come in either order
 } alb_tracer;
 
 typedef struct alb_hit {
@@ -18,6 +18,10 @@ typedef struct alb_hit {
 
 // Copies the mesh, which may be empty. The tracer stays at its address (Embree counts bytes into it).
 bool alb_tracer_create(alb_tracer *tracer, const alb_mesh *mesh, alb_error *error);
+// For a mesh that moves: made and moved in a tenth of the time or less, rays take longer.
+bool alb_tracer_create_moving(alb_tracer *tracer, const alb_mesh *mesh, alb_error *error);
+// The mesh's vertices, as many as it was created with, elsewhere. What fails leaves a tracer to be freed.
+bool alb_tracer_move(alb_tracer *tracer, const alb_vector *vertices, size_t count, alb_error *error);
 void alb_tracer_free(alb_tracer *tracer);
 // The closest hit of the ray; false where there is none. `direction` is a unit vector. Safe from many threads. Where a
 // front and a back lie within slack_mm (a sheet of two faces back to back) the front is what the ray meets.

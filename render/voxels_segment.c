@@ -4,6 +4,7 @@
 // triangles of the voxels that it enters. Those whose plane its piece within the voxel clearly does not meet are passed
 // over in single precision; of the others, two triangles evaluate the edge that they share with the same operations, so
 // a segment cannot slip between them: crossings are exactly odd and even but for one that runs in a triangle's plane.
+// About a corner rounding could deny all triangles that meet there: what is zero but for it is zero, and counts to all.
 #include "render/voxels.h"
 #include <math.h>
 
@@ -25,7 +26,7 @@ int alb_voxels_state(const alb_voxels *voxels, alb_vector point)
 // A walk along a segment, in voxels; t runs from 0 to 1.
 typedef struct walk {
     const alb_voxels *voxels;
-    double start[3], way[3], inverse[3], longest, t, until;
+    double start[3], way[3], inverse[3], longest, t, until, rounding;
     int cell[3], axis;          // where it leaves the cell, at `until`
     float enters[3], leaves[3]; // of a surface voxel: the piece of the segment within
 } walk;
@@ -40,6 +41,8 @@ static void walk_begin(walk *w, const alb_voxels *v, alb_vector from, alb_vector
         w->longest = fabs(w->way[a]) > w->longest ? fabs(w->way[a]) : w->longest;
         w->cell[a] = clamped(floor(w->start[a]), v->n[a]);
     }
+    const double box_mm = v->size_mm * (v->n[0] + v->n[1] + v->n[2]);
+    w->rounding = 1e-15 * box_mm * box_mm * v->size_mm * w->longest; // of a triple product
 }
 
 static void find_exit(walk *w)
@@ -100,15 +103,18 @@ static bool walk_step(walk *w)
     return w->until < 1 && w->cell[w->axis] >= 0 && w->cell[w->axis] < v->n[w->axis];
 }
 
+static double rounded(double x, double rounding) { return fabs(x) > rounding ? x : 0; }
+
 // Whether the segment meets the triangle; edges and corners count to all triangles that share them.
-static bool meets(alb_crossing *crossing, const alb_voxels *v, uint32_t triangle, alb_vector from, alb_vector way)
+static bool meets(alb_crossing *crossing, const walk *w, uint32_t triangle, alb_vector from, alb_vector way)
 {
-    const alb_vector *t = v->triangles[triangle];
+    const alb_vector *t = w->voxels->triangles[triangle];
     const alb_vector a = alb_sub(t[0], from), b = alb_sub(t[1], from), c = alb_sub(t[2], from);
-    const double ab = alb_dot(way, alb_cross(a, b)), bc = alb_dot(way, alb_cross(b, c));
+    const double ab = rounded(alb_dot(way, alb_cross(a, b)), w->rounding),
+                 bc = rounded(alb_dot(way, alb_cross(b, c)), w->rounding);
     if ((ab > 0 && bc < 0) || (ab < 0 && bc > 0))
         return false;
-    const double ca = alb_dot(way, alb_cross(c, a));
+    const double ca = rounded(alb_dot(way, alb_cross(c, a)), w->rounding);
     if ((ca > 0 && (ab < 0 || bc < 0)) || (ca < 0 && (ab > 0 || bc > 0)) || (ab == 0 && bc == 0 && ca == 0))
         return false;
     const alb_vector normal = alb_cross(alb_sub(b, a), alb_sub(c, a));
@@ -129,7 +135,7 @@ bool alb_voxels_inside(const alb_voxels *voxels, alb_vector from, alb_vector to)
         uint32_t end;
         for (uint32_t i = look_around(&w, &end, voxel); i < end; i++) {
             alb_crossing crossing;
-            if (!passes_by(&w, i) && meets(&crossing, voxels, voxels->lists[i], from, way))
+            if (!passes_by(&w, i) && meets(&crossing, &w, voxels->lists[i], from, way))
                 return false;
         }
     } while (walk_step(&w));
@@ -163,7 +169,7 @@ size_t alb_voxels_crossings(alb_crossing *crossings, size_t most, const alb_voxe
         uint32_t end;
         for (uint32_t i = look_around(&w, &end, voxel); i < end; i++) {
             alb_crossing crossing;
-            if (passes_by(&w, i) || !meets(&crossing, voxels, voxels->lists[i], from, way))
+            if (passes_by(&w, i) || !meets(&crossing, &w, voxels->lists[i], from, way))
                 continue;
             if (count == most)
                 return most + 1;

@@ -173,6 +173,58 @@ static void prisms_follow_their_unfolding(void **state)
     }
 }
 
+// However coarse the graph, paths are drawn tight about the triangles.
+static void coarse_voxels_are_as_good(void **state)
+{
+    (void)state;
+    static const squares u = {3, 3, {"###", "#.#", "#.#"}};
+    for (int k = 0; k < 2; k++) {
+        alb_error error = {0};
+        world w = {0};
+        check_ok(make_squares(&w.mesh, &u, 16, 1, &error), &error);
+        world_create(&w, (alb_optical_options){.voxel_mm = k ? 0.675 : 0.3});
+        const errors e = errors_of(&w, &u, 0, 20, 80, at_corners);
+        assert_true(e.bent > 300);
+        check_below(fabs(e.mean), 0.0005);
+        check_below(e.largest, 0.02);
+        check_below(-e.least, 1e-4);
+        world_free(&w);
+    }
+}
+
+// Out of a ball, exactly through corners of its mesh, where rounding alone decides on which side of each edge.
+static void no_segment_slips_through_a_corner(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    world w = {0};
+    check_ok(alb_shape_sphere(&w.mesh, &(alb_sphere){.radius_mm = 2, .subdivisions = 2}, &error), &error);
+    alb_vector(*triangles)[3] = calloc(w.mesh.face_count, sizeof *triangles);
+    for (size_t i = 0; i < w.mesh.face_count; i++)
+        for (int k = 0; k < 3; k++)
+            triangles[i][k] = w.mesh.vertices[w.mesh.faces[i][k]];
+    alb_voxels voxels;
+    check_ok(
+        alb_voxels_create(&voxels, (const alb_vector(*)[3])triangles, w.mesh.face_count, 0.4, 100000, true, &error),
+        &error);
+    for (uint64_t i = 0; i < 50000; i++) {
+        alb_random random = alb_random_at(5, 1, i);
+        alb_crossing crossings[16];
+        const alb_vector corner = w.mesh.vertices[(size_t)(alb_random_uniform(&random) * (double)w.mesh.vertex_count)],
+                         from = {alb_random_uniform(&random) - 0.5, alb_random_uniform(&random) - 0.5,
+                                 alb_random_uniform(&random) - 0.5},
+                         to = alb_add(from, alb_times(1.3, alb_sub(corner, from)));
+        assert_false(alb_voxels_inside(&voxels, from, to));
+        const size_t count = alb_voxels_crossings(crossings, 16, &voxels, from, to);
+        assert_true(count >= 1);
+        for (size_t c = 0; c < count; c++)
+            check_near(crossings[c].at, 1 / 1.3, 1e-9);
+    }
+    alb_voxels_free(&voxels);
+    free(triangles);
+    alb_mesh_free(&w.mesh);
+}
+
 // Fingers closer than a voxel: no path crosses the gap.
 static void grid_short_circuit(void **state)
 {
@@ -452,6 +504,8 @@ int main(void)
         cmocka_unit_test(chords_of_a_sphere_stay_inside),
         cmocka_unit_test(ring_follows_its_closed_form),
         cmocka_unit_test(prisms_follow_their_unfolding),
+        cmocka_unit_test(coarse_voxels_are_as_good),
+        cmocka_unit_test(no_segment_slips_through_a_corner),
         cmocka_unit_test(grid_short_circuit),
         cmocka_unit_test(sheet_below_a_voxel),
         cmocka_unit_test(tube_is_a_sheet),
