@@ -13,9 +13,11 @@
 // sight); what the variance along it adds, the kernel knows (scatter_kernel.c).
 #include "render/scatter_links.h"
 #include "base/memory.h"
+#include "base/progress.h"
 #include "base/vector_clones.h"
 #include "render/scatter_block.h"
 #include <float.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -142,7 +144,7 @@ static void want(const viewer *v, wish wished)
 
 static float lengthened(float distance, const detour *by)
 {
-    return by->length != 0 ? distance + by->length * fminf(distance / by->at, 1) : distance;
+    return by->length != 0 ? distance + by->length * fminf(fmaxf(distance, by->length) / by->at, 1) : distance;
 }
 
 // Three distances with the mean, variance and skewness of a distribution whose fourth moment is that of a triangle's
@@ -227,7 +229,7 @@ static void find_distances(float distances[ALB_SHARES_MAX][ALB_BLOCK], const vie
     alb_patch_triangle(t, v->patches, v->forest->patches[cluster->leaf]);
     for (int k = 0; k < 3; k++)
         t[k] = alb_sub(t[k], v->tree->middle_mm);
-    const int count = kind == ALB_LINK_EIGHTHS ? ALB_PARTS_MAX : alb_parts_most(cluster);
+    const int count = alb_parts_most(cluster);
     const float share = alb_parts_cut(parts, cluster, t, count);
     for (int part = 0; part < count; part++)
         measure(of_parts[part], along_mm2, v, &parts[part], wished->side == ALB_TRANSMISSION);
@@ -570,7 +572,7 @@ static void grant(const viewer *v)
             row++;
         const detour *by = &work->detours[k][row];
         const float scale = by->length != 0 ? 1 + by->length / by->at : 1;
-        if (scale > 0.5F && scale < 2.5F)
+        if (scale > 0.5F && scale < 1.25F)
             add_pair(v, wished, row, scale);
         else
             add_link(v, wished, ALB_LINK_EIGHTHS, work->detours[k]);
@@ -620,11 +622,14 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
 {
     bool failed = false;
     uint32_t *trees = NULL;
+    long done = 0;
+    alb_progress progress;
     *links = (alb_links){0};
     if (!lay_blocks(links, &trees, forest, error)) {
         alb_links_free(links);
         return false;
     }
+    alb_progress_begin(&progress, "scattering", (long)links->block_count);
 #pragma omp parallel reduction(|| : failed)
     {
         workspace work = {0};
@@ -645,6 +650,9 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
                         .row_count = block->row_count,
                         .work = &work};
             link_block(block, &v, own);
+            const long so_far = __atomic_add_fetch(&done, 1, __ATOMIC_RELAXED);
+            if (omp_get_thread_num() == 0)
+                alb_progress_at(&progress, so_far);
         }
         failed = failed || work.found.failed;
         free(work.wishes);
@@ -655,6 +663,7 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
         alb_optical_workspace_free(&work.paths);
         alb_found_links_free(&work.found);
     }
+    alb_progress_end(&progress);
     free(trees);
     if (failed) {
         alb_links_free(links);
