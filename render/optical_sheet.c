@@ -175,8 +175,10 @@ static bool find_sides(alb_optical_sheet *sheet, const alb_surface_net *net, alb
 
 bool alb_optical_sheet_prepare(alb_optical_sheet *sheet, const alb_surface_net *net, double limit_mm, alb_error *error)
 {
-    for (size_t i = 0; i < net->count; i++)
-        if (sheet->thickness[i] > limit_mm)
+    for (size_t i = 0; i < net->count;
+         i++) // a rim that looks into a bend sees a face that sees its own opposite nearer
+        if (sheet->thickness[i] > limit_mm ||
+            (sheet->facing[i] != UINT32_MAX && sheet->thickness[i] > 1.5 * sheet->thickness[sheet->facing[i]]))
             sheet->facing[i] = UINT32_MAX;
     if (!find_faces(sheet, net, error) || !find_sides(sheet, net, error))
         return false;

@@ -142,7 +142,7 @@ static void want(const viewer *v, wish wished)
 
 static float lengthened(float distance, const detour *by)
 {
-    return by->length != 0 ? distance + by->length * fminf(distance / by->at, 1) : distance;
+    return by->length != 0 ? distance + by->length * fminf(fmaxf(distance, by->length) / by->at, 1) : distance;
 }
 
 // Three distances with the mean, variance and skewness of a distribution whose fourth moment is that of a triangle's
@@ -227,7 +227,7 @@ static void find_distances(float distances[ALB_SHARES_MAX][ALB_BLOCK], const vie
     alb_patch_triangle(t, v->patches, v->forest->patches[cluster->leaf]);
     for (int k = 0; k < 3; k++)
         t[k] = alb_sub(t[k], v->tree->middle_mm);
-    const int count = kind == ALB_LINK_EIGHTHS ? ALB_PARTS_MAX : alb_parts_most(cluster);
+    const int count = alb_parts_most(cluster);
     const float share = alb_parts_cut(parts, cluster, t, count);
     for (int part = 0; part < count; part++)
         measure(of_parts[part], along_mm2, v, &parts[part], wished->side == ALB_TRANSMISSION);
@@ -570,7 +570,7 @@ static void grant(const viewer *v)
             row++;
         const detour *by = &work->detours[k][row];
         const float scale = by->length != 0 ? 1 + by->length / by->at : 1;
-        if (scale > 0.5F && scale < 2.5F)
+        if (scale > 0.5F && scale < 1.25F)
             add_pair(v, wished, row, scale);
         else
             add_link(v, wished, ALB_LINK_EIGHTHS, work->detours[k]);

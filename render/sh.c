@@ -12,7 +12,7 @@
 typedef struct step {
     double a, b;
 } step;
-enum { KEPT = 32 };
+enum { KEPT = 32, LONGEST = 256 }; // orders
 static step kept[KEPT][KEPT];
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
@@ -71,19 +71,29 @@ static void begin_column(column *c, int m, alb_vector d)
     c->first *= sqrt((2 * m + 1) / (2.0 * m)) * (m == 1 ? M_SQRT2 : 1);
 }
 
+// The next column's values for l = m .. order - 1, without the azimuth.
+static void next_column(double *values, column *c, int m, int order, alb_vector d)
+{
+    begin_column(c, m, d);
+    double last = 0, before = 0;
+    for (int l = m; l < order; l++) {
+        const double value = l > m ? next(l, m, d.z, last, before) : c->first;
+        before = last, last = value;
+        values[l - m] = value;
+    }
+}
+
 void alb_sh_evaluate(double *values, int order, alb_vector d)
 {
     pthread_once(&once, make_kept);
     column c;
+    double of_m[LONGEST];
     for (int m = 0; m < order; m++) {
-        begin_column(&c, m, d);
-        double last = 0, before = 0;
+        next_column(of_m, &c, m, order, d);
         for (int l = m; l < order; l++) {
-            const double value = l > m ? next(l, m, d.z, last, before) : c.first;
-            before = last, last = value;
-            values[alb_sh_index(l, m)] = value * c.re;
+            values[alb_sh_index(l, m)] = of_m[l - m] * c.re;
             if (m)
-                values[alb_sh_index(l, -m)] = value * c.im;
+                values[alb_sh_index(l, -m)] = of_m[l - m] * c.im;
         }
     }
 }
@@ -113,16 +123,12 @@ void alb_sh_differentiate(double *values, int order, alb_vector d, alb_vector t)
 double alb_sh_value(const double *coefficients, int order, alb_vector direction)
 {
     pthread_once(&once, make_kept);
-    double sum = 0;
+    double sum = 0, of_m[LONGEST];
     column c;
     for (int m = 0; m < order; m++) {
-        begin_column(&c, m, direction);
-        double last = 0, before = 0;
-        for (int l = m; l < order; l++) {
-            const double value = l > m ? next(l, m, direction.z, last, before) : c.first;
-            before = last, last = value;
-            sum += value * (coefficients[alb_sh_index(l, m)] * c.re + coefficients[alb_sh_index(l, -m)] * c.im);
-        }
+        next_column(of_m, &c, m, order, direction);
+        for (int l = m; l < order; l++)
+            sum += of_m[l - m] * (coefficients[alb_sh_index(l, m)] * c.re + coefficients[alb_sh_index(l, -m)] * c.im);
     }
     return sum;
 }

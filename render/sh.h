@@ -31,7 +31,7 @@ void alb_sh_differentiate(double *values, int order, alb_vector direction, alb_v
 // values[i * stride + r] of directions[c * stride + r], c = 0, 1, 2 for x, y, z; errors below 2e-6.
 void alb_sh_evaluate_batch(float *values, int order, const float *directions, size_t stride, size_t count);
 
-// sum c_i Y_i(direction).
+// sum c_i Y_i(direction); order up to 256.
 double alb_sh_value(const double *coefficients, int order, alb_vector direction);
 
 // From or to the basis with the Condon-Shortley phase ((-1)^m Y_lm; google/spherical-harmonics, DirectXMath): the

@@ -66,11 +66,9 @@ static uint8_t add_entries(table *t, int *count, const grid *g, int order, const
     int from = abs(l[0] - l[1]);
     from = from >= m ? from : from + (m - from + 1) / 2 * 2;
     for (int k = from; k <= l[0] + l[1] && k < order; k += 2) {
-        const double half = p->plus[0] == p->plus[1] ? 0.5 : 1; // a b + b a of one
-        t->entries[(*count)++] =
-            (entry){.gaunt = (float)(half * integral(g, p->plus[0], p->plus[1], alb_sh_index(k, m))),
-                    .plus = (uint8_t)alb_sh_index(k, m),
-                    .minus = (uint8_t)alb_sh_index(k, -m)};
+        t->entries[(*count)++] = (entry){.gaunt = (float)integral(g, p->plus[0], p->plus[1], alb_sh_index(k, m)),
+                                         .plus = (uint8_t)alb_sh_index(k, m),
+                                         .minus = (uint8_t)alb_sh_index(k, -m)};
     }
     return (uint8_t)(*count - before);
 }
@@ -82,7 +80,7 @@ static void add_pairs(table *t, int *pairs, int *entries, const grid *g, int ord
         for (int second = 0; second <= first; second++) {
             int l[2] = {(int)sqrt(first), (int)sqrt(second)},
                 m[2] = {first - l[0] * (l[0] + 1), second - l[1] * (l[1] + 1)};
-            if (m[0] < 0 || m[1] < 0 || kind != (m[0] == 0) + (m[1] == 0))
+            if (!second || m[0] < 0 || m[1] < 0 || kind != (m[0] == 0) + (m[1] == 0))
                 continue;
             const int big = m[1] > m[0], small = !big;
             pair *p = &t->pairs[(*pairs)++];
@@ -112,10 +110,13 @@ static void make_tables(void)
     }
 }
 
-// x_i y_j + x_j y_i
+// x_i y_j + x_j y_i, of one harmonic x_i y_i
 ALB_LANES_INLINE void cross(alb_lanes out, alb_lanes *x, alb_lanes *y, int i, int j)
 {
-    ALB_EACH_LANE out[lane] = x[i][lane] * y[j][lane] + x[j][lane] * y[i][lane];
+    if (i == j)
+        ALB_EACH_LANE out[lane] = x[i][lane] * y[i][lane];
+    else
+        ALB_EACH_LANE out[lane] = x[i][lane] * y[j][lane] + x[j][lane] * y[i][lane];
 }
 
 ALB_LANES_INLINE void add_both(alb_lanes *out, const entry **e, int count, const alb_lanes cosine, const alb_lanes sine)
@@ -137,23 +138,43 @@ ALB_LANES_INLINE void add_one(alb_lanes *out, const entry **e, int count, const 
     }
 }
 
+// All that has Y_00 in it: (a_0 b + b_0 a) / sqrt(4 pi), a_0 b_0 once.
+ALB_LANES_INLINE void begin_block(alb_lanes *out, alb_lanes *a, alb_lanes *b, int values)
+{
+    const float gaunt = 0.28209479F;
+    alb_lanes x, y;
+    ALB_EACH_LANE x[lane] = gaunt * a[0][lane];
+    ALB_EACH_LANE y[lane] = gaunt * b[0][lane];
+    ALB_EACH_LANE out[0][lane] = gaunt * (a[0][lane] * b[0][lane]);
+    for (int i = 1; i < values; i++)
+        ALB_EACH_LANE out[i][lane] = x[lane] * b[i][lane] + y[lane] * a[i][lane];
+}
+
 ALB_LANES_INLINE void multiply_block(alb_lanes *out, alb_lanes *a, alb_lanes *b, const table *t)
 {
     const entry *e = t->entries;
     const pair *p = t->pairs;
-    alb_lanes cc, ss, cs, sc;
+    alb_lanes cc, ss, cs, sc, cosine, sine;
     for (; p < t->pairs + t->ends[0]; p++) {
         cross(cc, a, b, p->plus[0], p->plus[1]);
         cross(ss, a, b, p->minus[0], p->minus[1]);
-        cross(cs, a, b, p->plus[0], p->minus[1]);
-        cross(sc, a, b, p->minus[0], p->plus[1]);
-        alb_lanes cosine, sine;
-        ALB_EACH_LANE cosine[lane] = cc[lane] - ss[lane];
-        ALB_EACH_LANE sine[lane] = sc[lane] + cs[lane];
-        add_both(out, &e, p->sums, cosine, sine);
+        const bool same = p->plus[0] == p->plus[1];
+        if (p->sums || p->differences) {
+            cross(cs, a, b, p->plus[0], p->minus[1]);
+            if (!same)
+                cross(sc, a, b, p->minus[0], p->plus[1]);
+        }
+        if (p->sums) {
+            ALB_EACH_LANE cosine[lane] = cc[lane] - ss[lane];
+            if (!same)
+                ALB_EACH_LANE sine[lane] = sc[lane] + cs[lane];
+            add_both(out, &e, p->sums, cosine, same ? cs : sine);
+        }
         ALB_EACH_LANE cosine[lane] = cc[lane] + ss[lane];
-        ALB_EACH_LANE sine[lane] = sc[lane] - cs[lane];
-        add_both(out, &e, p->differences, cosine, sine);
+        if (p->differences) {
+            ALB_EACH_LANE sine[lane] = sc[lane] - cs[lane];
+            add_both(out, &e, p->differences, cosine, sine);
+        }
         add_one(out, &e, p->zeros, cosine);
     }
     for (; p < t->pairs + t->ends[1]; p++) {
@@ -175,7 +196,7 @@ static void multiply(float *out, const float *a, const float *b, int order, size
         alb_lanes x[ALB_SH_COUNT_MAX], y[ALB_SH_COUNT_MAX], z[ALB_SH_COUNT_MAX];
         alb_lanes_load(x, a + r, stride, count - r, values);
         alb_lanes_load(y, b + r, stride, count - r, values);
-        memset(z, 0, (size_t)values * sizeof *z);
+        begin_block(z, x, y, values);
         multiply_block(z, x, y, &tables[order]);
         alb_lanes_store(out + r, z, stride, count - r, values);
     }

@@ -4,6 +4,7 @@
 #include "render/sh_scale_batch.h"
 #include "base/memory.h"
 #include "base/vector_clones.h"
+#include "render/sh_lanes.h"
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -12,7 +13,6 @@
 enum { LANES = 8, BLOCKS = 8, PADDED_MAX = 208 }; // order 8: 204
 typedef float eight __attribute__((vector_size(LANES * sizeof(float))));
 typedef int32_t eight_bits __attribute__((vector_size(LANES * sizeof(int32_t))));
-#define INLINE static inline __attribute__((always_inline))
 
 static bool falls(const alb_sh_law *law)
 {
@@ -59,7 +59,7 @@ void alb_sh_batch_free(alb_sh_batch *batch)
 }
 
 // Eight vectors of eight values become eight vectors of eight receivers.
-INLINE void turn_over(eight *out, const eight *in)
+ALB_LANES_INLINE void turn_over(eight *out, const eight *in)
 {
     eight pair[8], four[8];
     for (int i = 0; i < 4; i++) {
@@ -88,7 +88,7 @@ typedef struct places {
 // The smaller of two vectors, b where one is NaN.
 #define SMALLER(a, b) ((eight)((((a) < (b)) & (eight_bits)(a)) | (~((a) < (b)) & (eight_bits)(b))))
 
-INLINE void find_places(places *p, const alb_sh_batch *batch, const eight *ratio)
+ALB_LANES_INLINE void find_places(places *p, const alb_sh_batch *batch, const eight *ratio)
 {
     const eight k = *ratio, zero = {0}, none = -zero, last = zero + (float)(batch->cells - 1);
     const float half = 0.5f * (float)batch->cells;
@@ -109,7 +109,7 @@ INLINE void find_places(places *p, const alb_sh_batch *batch, const eight *ratio
     }
 }
 
-INLINE void interpolate(eight *m, const alb_sh_batch *batch, const places *p, int padded)
+ALB_LANES_INLINE void interpolate(eight *m, const alb_sh_batch *batch, const places *p, int padded)
 {
     const float *rows[LANES];
     for (int r = 0; r < LANES; r++)
@@ -129,8 +129,8 @@ INLINE void interpolate(eight *m, const alb_sh_batch *batch, const places *p, in
 }
 
 // One block: coefficient i of its receivers at in + i * stride.
-INLINE void multiply(float *out, size_t out_stride, const eight *value, const float *in, size_t in_stride,
-                     const eight *factor, int rows, int columns, bool transposed)
+ALB_LANES_INLINE void multiply(float *out, size_t out_stride, const eight *value, const float *in, size_t in_stride,
+                               const eight *factor, int rows, int columns, bool transposed)
 {
 #pragma GCC unroll 8
     for (int m = 0; m < rows; m++) {
@@ -157,8 +157,8 @@ INLINE void multiply(float *out, size_t out_stride, const eight *value, const fl
     }
 }
 
-INLINE void apply_block(float *out, const eight *m, const eight *factor, const float *in, size_t stride, size_t items,
-                        int rows, int columns, bool transposed)
+ALB_LANES_INLINE void apply_block(float *out, const eight *m, const eight *factor, const float *in, size_t stride,
+                                  size_t items, int rows, int columns, bool transposed)
 {
     eight from[ALB_SH_COUNT_MAX], to[ALB_SH_COUNT_MAX];
     if (items >= LANES) {
@@ -173,8 +173,8 @@ INLINE void apply_block(float *out, const eight *m, const eight *factor, const f
         memcpy(out + (size_t)i * stride, &to[i], items * sizeof *out);
 }
 
-INLINE void apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride, size_t count,
-                  int rows, int columns, bool transposed, int padded)
+ALB_LANES_INLINE void apply(float *out, const alb_sh_batch *batch, const float *k, const float *in, size_t stride,
+                            size_t count, int rows, int columns, bool transposed, int padded)
 {
     for (size_t first = 0; first < count; first += BLOCKS * LANES) {
         const size_t left = count - first < BLOCKS * LANES ? count - first : BLOCKS * LANES;

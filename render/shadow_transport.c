@@ -219,26 +219,26 @@ bool alb_shadow_transport_lobes(float *lobes, bool *in_body, const alb_shadow_tr
                                 size_t count)
 {
     enum { BLOCK = ALB_SHADOW_BLOCK };
-    float own[VALUES * BLOCK], turns[4 * BLOCK];
-    size_t found = 0;
+    const float *q = t->quaternion;
     bool coloured = false;
     for (size_t r = 0; r < count; r++) {
-        const uint32_t row = t->row_count ? t->rows[first + r] : ALB_TRANSPORT_NONE;
-        in_body[r] = row != ALB_TRANSPORT_NONE;
-        const bool translucent = in_body[r] && t->matrix_of[row] != ALB_TRANSPORT_NONE;
-        const float *vector = translucent ? t->matrices[t->matrix_of[row]][colour] : t->vectors[in_body[r] ? row : 0];
-        for (size_t i = 0; in_body[r] && i < VALUES; i++)
-            own[i * BLOCK + found] = vector[i];
+        const uint32_t row = t->rows[first + r];
+        if (!(in_body[r] = row != ALB_TRANSPORT_NONE))
+            continue;
+        const bool translucent = t->matrix_of[row] != ALB_TRANSPORT_NONE;
+        const float *vector = translucent ? t->matrices[t->matrix_of[row]][colour] : t->vectors[row];
+        for (size_t i = 0; i < VALUES; i++)
+            lobes[i * BLOCK + r] = vector[i];
         coloured |= translucent;
-        for (size_t i = 0; in_body[r] && i < 4; i++)
-            turns[i * BLOCK + found] = t->quaternion[i];
-        found += in_body[r];
     }
-    const float *q = t->quaternion;
-    if (fabsf(q[0]) + fabsf(q[1]) + fabsf(q[2]) > 1e-7F)
-        alb_sh_rotate_batch(own, own, ALB_SH_ORDER_MAX, turns, BLOCK, found);
-    for (size_t r = 0, k = 0; r < count; k += in_body[r++])
-        for (size_t i = 0; in_body[r] && i < VALUES; i++)
-            lobes[i * BLOCK + r] = own[i * BLOCK + k];
+    if (fabsf(q[0]) + fabsf(q[1]) + fabsf(q[2]) > 1e-7F) {
+        float turned[VALUES * BLOCK], turns[4 * BLOCK];
+        for (size_t i = 0; i < 4 * BLOCK; i++)
+            turns[i] = q[i / BLOCK];
+        alb_sh_rotate_batch(turned, lobes, ALB_SH_ORDER_MAX, turns, BLOCK, count);
+        for (size_t i = 0; i < VALUES; i++)
+            for (size_t r = 0; r < count; r++)
+                lobes[i * BLOCK + r] = in_body[r] ? turned[i * BLOCK + r] : lobes[i * BLOCK + r];
+    }
     return coloured;
 }

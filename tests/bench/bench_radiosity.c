@@ -65,15 +65,14 @@ static bool relight(figures *out, alb_solution *s, alb_scene *scene, alb_error *
     return solve_again(&jacobi_s, &out->jacobi_products, s, ALB_SOLVER_JACOBI, error);
 }
 
-// Everything of two exponentials widens by a quarter, the total stays: links hold for wider profiles, and narrower
-// ones are refused in the rose's innermost petals (docs/radiosity.md).
+// Everything of two exponentials narrows by a quarter, the total stays.
 static bool change_translucency(figures *out, alb_solution *s, alb_scene *scene, alb_error *error)
 {
     for (size_t i = 0; i < scene->surface_count; i++)
         for (int side = 0; side < ALB_SIDES; side++)
             for (int c = 0; c < 3; c++) {
                 double *p = scene->surfaces[i].profiles[side][c].parameters;
-                p[0] /= 1.5625, p[1] /= 1.25, p[2] /= 1.5625, p[3] /= 1.25;
+                p[0] *= 1.5625, p[1] *= 1.25, p[2] *= 1.5625, p[3] *= 1.25;
             }
     if (!alb_solution_rematerial(s, scene, error))
         return false;

@@ -7,48 +7,40 @@
 // the irradiance over 2000 vertices (not of lights, not inside others) against 4096 rays each, in percent of the mean,
 // worst of three frames. Rays are cast from the same vertices on as many cores; their time is that of every vertex.
 #include "base/plot.h"
-#include "base/random.h"
 #include "render/shadow_picture.h"
-#include "render/shadow_rays.h"
-#include "render/shadow_stage.h"
 #include "render/view.h"
+#include "scenes/shadow_full.h"
 #include "scenes/shadow_scenes.h"
+#include "scenes/shadow_truth.h"
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-enum { SAMPLES = 2000, WAYS = 9, RAYS = 4, CHECKED = 3, SHADE = 160 };
+enum { WAYS = 10, RAYS = 4, CHECKED = 3, SHADE = 160 };
 
 static const struct {
     const char *name;
-    bool paper, regressed, transport, probes;
+    enum { FIELDS, PAPER, REGRESSED, PROBES, TRANSPORT, FULL } kind;
     int order, outer, inner, cells, pixels;
     double cluster;
-} ways[WAYS] = {{"as printed", true, false, false, false, 4, 1, 0, 8, 32, 0},
-                {"windowed", false, false, false, false, 4, 1, 0, 8, 64, 0.04},
-                {"regressed", false, true, false, false, 4, 1, 0, 8, 64, 0.04},
-                {"order 8 to 4", false, false, false, false, 8, 1, 0, 8, 64, 0.04},
-                {"2 shells", false, false, false, false, 4, 2, 0, 8, 64, 0.04},
-                {"4 shells", false, false, false, false, 4, 1, 2, 8, 64, 0.04},
-                {"4 shells, order 8", false, false, false, false, 8, 1, 2, 12, 64, 0.02},
-                {"transport", false, false, true, false, 4, 1, 0, 8, 64, 0.04},
-                {"probes", false, false, false, true, 4, 1, 0, 8, 64, 0.04}};
+} ways[WAYS] = {{"as printed", PAPER, 4, 1, 0, 8, 32, 0},
+                {"windowed", FIELDS, 4, 1, 0, 8, 64, 0.04},
+                {"regressed", REGRESSED, 4, 1, 0, 8, 64, 0.04},
+                {"order 8 to 4", FIELDS, 8, 1, 0, 8, 64, 0.04},
+                {"2 shells", FIELDS, 4, 2, 0, 8, 64, 0.04},
+                {"4 shells", FIELDS, 4, 1, 2, 8, 64, 0.04},
+                {"4 shells, order 8", FIELDS, 8, 1, 2, 12, 64, 0.02},
+                {"probes", PROBES, 4, 1, 0, 8, 64, 0.04},
+                {"transport", TRANSPORT, 4, 1, 0, 8, 64, 0.04},
+                {"16 shells", FULL, 4, 1, 0, 8, 64, 0.04}};
 #define BOTTOM 0.3 // percent, of the chart
 static const int strata[RAYS] = {4, 8, 16, 32};
 
 typedef struct result {
     double ms, sampling_ms, scaling_ms, products_ms, error_percent[2]; // on the ground, on the model
 } result;
-
-typedef struct truth {
-    size_t count, vertices[SAMPLES];
-    alb_vector points[SAMPLES], normals[SAMPLES];
-    float irradiance[SAMPLES][3];
-    alb_tracer tracer;
-    float (*radiance)[3];
-} truth;
 
 static double now_s(void)
 {
@@ -64,11 +56,9 @@ static bool take_regressed(alb_shadow_stage *stage, alb_error *error)
     return alb_sh_batch_create(&stage->laws.outer, &law, 256, error);
 }
 
-static bool has_rigid(const alb_scene *scene) { return scene->objects[scene->object_count - 1].rigid; }
-
 static alb_shadow_stage stage_of(int way)
 {
-    alb_shadow_stage stage = {.settings = alb_shadow_defaults, .paper = ways[way].paper};
+    alb_shadow_stage stage = {.settings = alb_shadow_defaults, .paper = ways[way].kind == PAPER};
     stage.settings.order = ways[way].order;
     stage.settings.outer = ways[way].outer;
     stage.settings.inner = ways[way].inner;
@@ -76,7 +66,7 @@ static alb_shadow_stage stage_of(int way)
     stage.settings.cells = ways[way].cells;
     stage.settings.pixels = ways[way].pixels;
     stage.settings.cluster = ways[way].cluster;
-    if (!ways[way].probes)
+    if (ways[way].kind != PROBES)
         stage.settings.probes = 0;
     return stage;
 }
@@ -87,127 +77,95 @@ static bool create_scene(alb_scene *scene, int index, int frame, int way, alb_er
     if (!shadow_scenes[index].create(scene, frame, error))
         return false;
     for (size_t o = 0; o < scene->object_count; o++)
-        scene->objects[o].rigid &= ways[way].transport;
+        scene->objects[o].rigid &= ways[way].kind == TRANSPORT;
     return true;
 }
 
-static bool in_light(const alb_shadow_stage *stage, const alb_scene *scene, size_t vertex)
+// Transport is for what is rigid, the full field for one occluder under skies.
+static bool applies(int way, const alb_scene *scene)
 {
-    for (size_t i = stage->occluder_count; i < stage->occluder_count + stage->light_count; i++) {
-        const alb_object *o = &scene->objects[stage->objects[i]];
-        if (vertex >= o->first_vertex && vertex - o->first_vertex < o->vertex_count)
-            return true;
-    }
-    return false;
+    return (ways[way].kind != TRANSPORT || scene->objects[scene->object_count - 1].rigid) &&
+           (ways[way].kind != FULL || scene->light_count);
 }
 
-static bool find_truth(truth *t, const alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
+// The stage lit in any case: normals and skies are its own.
+static bool light_full(double *frame_s, shadow_full *full, alb_shadow_stage *stage, const alb_scene *scene,
+                       alb_error *error)
 {
-    alb_mesh casters = {0};
-    bool ok = (t->radiance = calloc(scene->mesh.face_count, sizeof *t->radiance)) != NULL;
-    for (size_t v = 0; ok && v < scene->mesh.vertex_count; v++)
-        ok = alb_mesh_add_vertex(&casters, scene->mesh.vertices[v], error);
-    for (size_t f = 0; ok && f < scene->mesh.face_count; f++) {
-        const uint32_t *v = scene->mesh.faces[f];
-        if (v[0] < scene->objects[0].vertex_count) // the ground casts nothing
-            continue;
-        const size_t count = casters.face_count;
-        ok = alb_mesh_add_face(&casters, v[0], v[1], v[2], 0, error);
-        for (int c = 0; c < 3 && casters.face_count > count; c++)
-            t->radiance[count][c] = (float)(scene->surfaces[scene->mesh.groups[f]].exitance[c] / M_PI);
-    }
-    ok = ok && alb_tracer_create(&t->tracer, &casters, error);
-    alb_mesh_free(&casters);
-    alb_random random = alb_random_at(3, 1, 0);
-    for (t->count = 0; ok && t->count < SAMPLES;) {
-        const size_t v = (size_t)(alb_random_uniform(&random) * (double)scene->mesh.vertex_count);
-        if (in_light(stage, scene, v) ||
-            alb_shadow_buried(&t->tracer, scene->mesh.vertices[v], stage->normals[v], 256 * t->tracer.slack_mm))
-            continue;
-        t->vertices[t->count] = v;
-        t->points[t->count] = scene->mesh.vertices[v];
-        t->normals[t->count++] = stage->normals[v];
-    }
+    const alb_object *object = &scene->objects[1];
+    const alb_vector *vertices = scene->mesh.vertices;
+    alb_mesh mesh = {0};
+    bool ok = full->shells[0].samples ||
+              (shadow_full_mesh(&mesh, scene, object, error) && shadow_full_create(full, &mesh, error));
+    alb_mesh_free(&mesh);
+    const double start_s = now_s();
+    ok = ok && shadow_full_sample(full, vertices + object->first_vertex, error);
     if (ok)
-        alb_shadow_cast(t->irradiance, &t->tracer, (const float(*)[3])t->radiance, scene->lights, scene->light_count,
-                        t->points, t->normals, t->count, 64, 256 * t->tracer.slack_mm, 1);
+        shadow_full_light(stage->irradiance, full, stage->skies, &stage->laws.sky, vertices, stage->normals,
+                          scene->mesh.vertex_count);
+    *frame_s = now_s() - start_s;
     return ok;
 }
 
-static void free_truth(truth *t)
+static bool check_frame(double error_percent[2], const alb_shadow_stage *stage, const alb_scene *scene,
+                        alb_error *error)
 {
-    alb_tracer_free(&t->tracer);
-    free(t->radiance);
+    static shadow_truth t;
+    static float found[SHADOW_TRUTH_SAMPLES][3];
+    const bool ok = shadow_truth_find(&t, stage, scene, error);
+    for (size_t i = 0; ok && i < t.count; i++)
+        memcpy(found[i], stage->irradiance[t.vertices[i]], sizeof found[i]);
+    for (int k = 0; ok && k < 2; k++)
+        error_percent[k] = fmax(
+            error_percent[k], shadow_truth_error(&t, (const float(*)[3])found, scene->objects[0].vertex_count, k == 1));
+    shadow_truth_free(&t);
+    return ok;
 }
 
-// On the ground, or on the model.
-static double error_of(const truth *t, const float (*found)[3], size_t ground, bool model)
+static int by_size(const void *a, const void *b)
 {
-    double sum = 0, mean = 0;
-    size_t count = 0;
-    for (size_t n = 0; n < t->count; n++) {
-        if (model == (t->vertices[n] < ground))
-            continue;
-        for (int c = 0; c < 3; c++) {
-            sum += pow((double)(found[n][c] - t->irradiance[n][c]), 2);
-            mean += (double)t->irradiance[n][c];
-        }
-        count += 3;
-    }
-    return count ? 100 * sqrt(sum / (double)count) / (mean / (double)count) : 0;
+    const double difference = *(const double *)a - *(const double *)b;
+    return (difference > 0) - (difference < 0);
 }
 
 static bool run_way(result *out, int scene_index, int way, int frames, alb_error *error)
 {
     const shadow_scene *which = &shadow_scenes[scene_index];
     alb_shadow_stage stage = stage_of(way);
-    double *times = calloc((size_t)frames, sizeof *times);
-    bool ok = times != NULL;
+    shadow_full full = {0};
+    double *times = calloc((size_t)frames + 1, sizeof *times); // the first makes the tables and fields
+    bool ok = times != NULL, apply = true;
     *out = (result){0};
-    for (int n = -1; ok && n < frames; n++) {
+    for (int n = 0; ok && apply && n <= frames; n++) {
         alb_scene scene;
-        const int frame = (n + 1) * which->frames / (frames + 1);
-        if (!create_scene(&scene, scene_index, frame, way, error)) {
+        if (!create_scene(&scene, scene_index, n * which->frames / (frames + 1), way, error)) {
             ok = false;
             break;
         }
-        if (ways[way].transport && !has_rigid(&scene)) { // it has none
-            alb_scene_free(&scene);
-            break;
-        }
+        apply = applies(way, &scene);
         const double start_s = now_s();
-        ok = alb_shadow_stage_light(&stage, &scene, error);
-        if (n >= 0) { // the first makes the tables and fields
-            times[n] = now_s() - start_s;
+        ok = !apply || alb_shadow_stage_light(&stage, &scene, error);
+        times[n] = now_s() - start_s;
+        if (ok && apply && ways[way].kind == FULL)
+            ok = light_full(&times[n], &full, &stage, &scene, error);
+        if (ok && n && apply) {
             const double share = times[n] / (stage.sampling_s + stage.light_s) * 1e3 / frames;
             const double light = stage.light_s / (stage.seconds.scaling + stage.seconds.products);
             out->sampling_ms += share * stage.sampling_s;
             out->scaling_ms += share * light * stage.seconds.scaling;
             out->products_ms += share * light * stage.seconds.products;
-        } else if (ok && ways[way].regressed)
+        } else if (ok && apply && ways[way].kind == REGRESSED)
             ok = take_regressed(&stage, error);
-        if (ok && n >= 0 && n % ((frames + CHECKED - 1) / CHECKED) == 0) {
-            static truth t;
-            static float found[SAMPLES][3];
-            ok = find_truth(&t, &stage, &scene, error);
-            for (size_t i = 0; ok && i < t.count; i++)
-                memcpy(found[i], stage.irradiance[t.vertices[i]], sizeof found[i]);
-            const size_t ground = scene.objects[0].vertex_count;
-            for (int k = 0; k < 2; k++)
-                out->error_percent[k] =
-                    fmax(out->error_percent[k], error_of(&t, (const float(*)[3])found, ground, k == 1));
-            free_truth(&t);
-        }
+        if (ok && apply && n && (n - 1) % ((frames + CHECKED - 1) / CHECKED) == 0)
+            ok = check_frame(out->error_percent, &stage, &scene, error);
         alb_scene_free(&scene);
     }
-    for (int i = 0; ok && i < frames; i++) // the median
-        for (int k = i + 1; k < frames; k++)
-            if (times[k] < times[i]) {
-                const double swap = times[i];
-                times[i] = times[k], times[k] = swap;
-            }
-    out->ms = ok ? 1e3 * times[frames / 2] : 0;
+    if (ok && apply) {
+        qsort(times + 1, (size_t)frames, sizeof *times, by_size);
+        out->ms = 1e3 * times[1 + frames / 2]; // the median
+    }
     free(times);
+    shadow_full_free(&full);
     alb_shadow_stage_free(&stage);
     return ok;
 }
@@ -217,21 +175,21 @@ static bool run_rays(double *ms, double (*percent)[RAYS], int scene_index, alb_e
     const shadow_scene *which = &shadow_scenes[scene_index];
     alb_scene scene;
     alb_shadow_stage stage = stage_of(1);
-    static truth t;
-    static float found[SAMPLES][3];
+    static shadow_truth t;
+    static float found[SHADOW_TRUTH_SAMPLES][3];
     bool ok = create_scene(&scene, scene_index, which->frames / 6, 1, error) &&
-              alb_shadow_stage_light(&stage, &scene, error) && find_truth(&t, &stage, &scene, error);
+              alb_shadow_stage_light(&stage, &scene, error) && shadow_truth_find(&t, &stage, &scene, error);
     for (int k = 0; ok && k < RAYS; k++) {
         const double start_s = now_s();
         alb_shadow_cast(found, &t.tracer, (const float(*)[3])t.radiance, scene.lights, scene.light_count, t.points,
                         t.normals, t.count, strata[k], 256 * t.tracer.slack_mm, 77);
         ms[k] = 1e3 * (now_s() - start_s) * (double)scene.mesh.vertex_count / (double)t.count;
         for (int model = 0; model < 2; model++)
-            percent[model][k] = error_of(&t, (const float(*)[3])found, scene.objects[0].vertex_count, model);
+            percent[model][k] = shadow_truth_error(&t, (const float(*)[3])found, scene.objects[0].vertex_count, model);
         printf("%-8s %4d rays %53.1f %21.2f %10.2f\n", which->name, strata[k] * strata[k], ms[k], percent[0][k],
                percent[1][k]);
     }
-    free_truth(&t);
+    shadow_truth_free(&t);
     alb_shadow_stage_free(&stage);
     alb_scene_free(&scene);
     return ok;
@@ -249,8 +207,9 @@ static double ray_time(const double *ms, const double *percent, double wanted)
 // Above the line of the rays they are as good in less time: hatched, up and down.
 static void shade(double *x, double *y, const double *ms, const double *percent, double top)
 {
+    const double low = fmax(percent[RAYS - 1] / 4, BOTTOM);
     for (int n = 0; n < SHADE; n++) {
-        y[2 * n] = percent[0] * pow(BOTTOM / percent[0], (double)n / (SHADE - 1));
+        y[2 * n] = percent[0] * pow(low / percent[0], (double)n / (SHADE - 1));
         x[2 * n] = x[2 * n + 1] = ray_time(ms, percent, y[2 * n]);
         y[2 * n + 1] = top;
         if (n % 2) {
@@ -268,7 +227,7 @@ typedef struct figures {
 static bool chart(const char *path, const figures *f, alb_error *error)
 {
     static const char *const colours[WAYS] = {"#d62728", "#1f77b4", "#17becf", "#9467bd", "#2ca02c",
-                                              "#8c564b", "#e377c2", "#000",    "#ff7f0e"};
+                                              "#8c564b", "#e377c2", "#bcbd22", "#000",    "#ff7f0e"};
     static double shade_x[SHADOW_SCENES][2 * SHADE], shade_y[SHADOW_SCENES][2 * SHADE], twice[SHADOW_SCENES][WAYS][2];
     alb_curve curves[SHADOW_SCENES][WAYS + 3];
     alb_panel panels[SHADOW_SCENES];

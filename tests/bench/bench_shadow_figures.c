@@ -7,18 +7,17 @@
 //                            by the laws of shadow_light.c. Its table: rms of the irradiance against 1024 rays, percent
 #include "base/plot.h"
 #include "base/random.h"
-#include "render/sh_product.h"
 #include "render/sh_rotate.h"
-#include "render/sh_zonal.h"
 #include "render/shadow_picture.h"
 #include "render/shadow_rays.h"
 #include "render/view.h"
+#include "scenes/shadow_full.h"
 #include "scenes/shadow_scenes.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { ELEMENTS = 6, POINTS = 121, DISTANCES = 5, DIRECTIONS = 60, LOOKS = 8192, SIDE = 110, FULL = 16, PICTURES = 5 };
+enum { ELEMENTS = 6, POINTS = 121, DISTANCES = 5, DIRECTIONS = 60, LOOKS = 8192, SIDE = 110, PICTURES = 5 };
 
 static bool write_elements(const char *folder, alb_error *error)
 {
@@ -70,15 +69,7 @@ typedef struct model {
 
 static bool make_model(model *m, const alb_scene *scene, alb_error *error)
 {
-    const alb_object *object = &scene->objects[1];
-    bool ok = true;
-    for (size_t v = 0; ok && v < object->vertex_count; v++)
-        ok = alb_mesh_add_vertex(&m->mesh, scene->mesh.vertices[object->first_vertex + v], error);
-    for (size_t f = 0; ok && f < scene->mesh.face_count; f++) {
-        const uint32_t *v = scene->mesh.faces[f], first = (uint32_t)object->first_vertex;
-        if (v[0] >= first)
-            ok = alb_mesh_add_face(&m->mesh, v[0] - first, v[1] - first, v[2] - first, 0, error);
-    }
+    bool ok = shadow_full_mesh(&m->mesh, scene, &scene->objects[1], error);
     for (int k = 0; ok && k < 2; k++) {
         alb_shadow_settings settings = alb_shadow_defaults;
         settings.inner = k ? 2 : 0, settings.far = k, settings.distance = k ? 1.1 : 1.05;
@@ -200,49 +191,6 @@ static bool write_visibility(const char *folder, const model *m, alb_error *erro
 
 // --- fig. 7 --------------------------------------------------------------------------------------------------------
 
-// Sixteen shells at .2 to 8 radii, those within 1.1 by rays; linear between them, no scaling.
-static bool make_full(alb_shadow_field *shells, const model *m, alb_error *error)
-{
-    bool ok = true;
-    for (int s = 0; s < FULL && ok; s++) {
-        const double radius = 0.2 + 0.52 * s;
-        alb_shadow_settings settings = alb_shadow_defaults;
-        settings.inner = radius < 1.1, settings.distance = fmax(radius, 1.1);
-        ok = alb_shadow_field_create(&shells[s], &settings, &m->mesh, NULL, "model", error);
-        if (ok && settings.inner)
-            shells[s].shells[0].radius = radius;
-        ok = ok && alb_shadow_field_sample(&shells[s], m->mesh.vertices, error);
-    }
-    return ok;
-}
-
-// Irradiance of one vertex under the sky: cosine times what is visible, as shadow_light.c has it.
-static void light_full(float out[3], const alb_shadow_field *shells, const alb_shadow_sky *sky, alb_vector at,
-                       alb_vector normal)
-{
-    const alb_shadow_sphere *sphere = &shells[0].sphere;
-    const alb_vector off = alb_sub(at, sphere->centre_mm);
-    const double place = fmin(fmax((alb_length(off) / sphere->radius_mm - 0.2) / 0.52, 0), FULL - 1 - 1e-9);
-    const int below = (int)place;
-    float low[16], high[16], visible[16], lobe[16], transfer[ALB_SH_COUNT_MAX * ALB_SHADOW_BLOCK] = {0};
-    double zonal[ALB_SH_ORDER_MAX], cosine[ALB_SH_COUNT_MAX];
-    alb_shadow_field_at(low, &shells[below], 0, off);
-    alb_shadow_field_at(high, &shells[below + 1], 0, off);
-    alb_sh_zonal_cosine(zonal, ALB_SH_ORDER_MAX);
-    alb_sh_zonal_turn(cosine, zonal, ALB_SH_ORDER_MAX, normal);
-    for (int i = 0; i < 16; i++) {
-        const float share = (float)(place - below);
-        visible[i] = (i ? 0 : (float)sqrt(4 * M_PI)) - (1 - share) * low[i] - share * high[i];
-        lobe[i] = (float)cosine[i];
-    }
-    alb_sh_product_batch(visible, lobe, visible, 4, 1, 1);
-    const float left = fminf(fmaxf(visible[0] / lobe[0], 0), 1);
-    for (int i = 0; i < ALB_SH_COUNT_MAX; i++)
-        transfer[i * ALB_SHADOW_BLOCK] = i < 16 ? visible[i] : left * (float)cosine[i];
-    memset(out, 0, 3 * sizeof *out);
-    alb_shadow_sky_add((float(*)[3])out, sky, NULL, transfer, &at, 1);
-}
-
 typedef struct pictures {
     alb_image all;
     double exposure;
@@ -280,14 +228,15 @@ static bool show(pictures *p, int number, const char *name, const alb_scene *sce
 
 static bool write_full(const char *folder, const model *m, const alb_scene *scene, alb_error *error)
 {
-    static alb_shadow_field shells[FULL];
+    static shadow_full full;
     pictures p = {0};
     alb_shadow_stage stage = {.settings = alb_shadow_defaults};
     stage.settings.probes = 0;
     const size_t n = scene->mesh.vertex_count;
     float(*black)[3] = calloc(scene->mesh.face_count, sizeof *black);
     bool ok = black && (p.truth = calloc(n, sizeof *p.truth)) && alb_shadow_stage_light(&stage, scene, error) &&
-              alb_image_create(&p.all, 320 * PICTURES, 240, "R,G,B", error) && make_full(shells, m, error);
+              alb_image_create(&p.all, 320 * PICTURES, 240, "R,G,B", error) &&
+              shadow_full_create(&full, &m->mesh, error) && shadow_full_sample(&full, m->mesh.vertices, error);
     printf("irradiance, rms error in percent of the mean: plane, model\n");
     if (ok)
         alb_shadow_cast(p.truth, &m->tracer, (const float(*)[3])black, scene->lights, scene->light_count,
@@ -295,8 +244,9 @@ static bool write_full(const char *folder, const model *m, const alb_scene *scen
     if (ok)
         memcpy(stage.irradiance, p.truth, n * sizeof *p.truth);
     ok = ok && show(&p, 0, "1024 rays", scene, &stage, error);
-    for (size_t v = 0; ok && v < n; v++)
-        light_full(stage.irradiance[v], shells, stage.skies, scene->mesh.vertices[v], stage.normals[v]);
+    if (ok)
+        shadow_full_light(stage.irradiance, &full, stage.skies, &stage.laws.sky, scene->mesh.vertices, stage.normals,
+                          n);
     ok = ok && show(&p, 1, "16 shells, not scaled", scene, &stage, error);
     for (int k = 0; ok && k < 3; k++) {
         static const char *const names[3] = {"1 shell, as printed", "1 shell", "4 shells"};
@@ -309,8 +259,7 @@ static bool write_full(const char *folder, const model *m, const alb_scene *scen
     char path[1024];
     snprintf(path, sizeof path, "%s/shadow_full.png", folder);
     ok = ok && alb_image_write_png(&p.all, 1, path, error);
-    for (int s = 0; s < FULL; s++)
-        alb_shadow_field_free(&shells[s]);
+    shadow_full_free(&full);
     alb_shadow_stage_free(&stage);
     alb_image_free(&p.all);
     free(p.truth);

@@ -1,19 +1,21 @@
-// Occlusion around the models of the four scenes, inside and outside their bounding spheres: one shell scaled as
-// printed, scaled by today's law, several shells, and the field of 16 shells without scaling that the paper compares
-// itself with (figs. 5 and 7 in numbers). Prints a table by ranges of distance and draws: bench.shadow_shells CHART.svg
+// Occlusion around the models of the four scenes and four objects made of balls (two apart, two that touch, an L of
+// five, a plate of 5 x 5), inside and outside their bounding spheres: one shell scaled as printed, scaled by today's
+// law, several shells, and the field of 16 shells without scaling that the paper compares itself with (figs. 5 and 7 in
+// numbers). Prints a table by ranges of distance and draws: bench.shadow_shells CHART.svg
 //
 // Error: rms over the sphere of directions of order-4 occlusion, against 8192 rays; mean square over 40 directions of
 // the receiver at each distance, those inside the model left out. Radii in radii of the bounding sphere.
 #include "base/plot.h"
 #include "base/random.h"
 #include "render/shadow_receivers.h"
+#include "render/shape.h"
 #include "render/tracer.h"
 #include "scenes/shadow_scenes.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { WAYS = 8, PLACES = 15, RECEIVERS = 40, RAYS = 8192, FULL = 16, FULL_RAYS = 512, RANGES = 4 };
+enum { WAYS = 9, PLACES = 15, RECEIVERS = 40, RAYS = 8192, FULL = 16, FULL_RAYS = 512, RANGES = 4 };
 static const double places[PLACES] = {.4, .5, .6, .7, .8, .9, 1, 1.15, 1.3, 1.6, 2, 2.7, 4, 5.5, 8};
 static const double range_ends[RANGES][2] = {{.5, .9}, {1, 2}, {2.7, 8}, {.4, 8}};
 static const struct {
@@ -21,16 +23,34 @@ static const struct {
     bool paper;
     int order, outer, inner;
     bool far;
-} ways[WAYS] = {{"1 shell, as printed", true, 4, 1, 0, false},
-                {"1 shell", false, 4, 1, 0, false},
-                {"2 shells", false, 4, 1, 1, false},
-                {"4 shells, near", false, 4, 2, 2, false},
-                {"4 shells", false, 4, 1, 2, true},
-                {"5 shells", false, 4, 1, 3, true},
-                {"16 shells, uniform", false, 4, 0, 0, false},
-                {"left out", false, 4, 0, 0, false}};
+    int cells;
+} ways[WAYS] = {{"1 shell, as printed", true, 4, 1, 0, false, 8},
+                {"1 shell", false, 4, 1, 0, false, 8},
+                {"2 shells", false, 4, 1, 1, false, 8},
+                {"4 shells, near", false, 4, 2, 2, false, 8},
+                {"4 shells", false, 4, 1, 2, true, 8},
+                {"5 shells", false, 4, 1, 3, true, 8},
+                {"5 shells, 16 cells", false, 4, 1, 3, true, 16},
+                {"16 shells, uniform", false, 4, 0, 0, false, 8},
+                {"left out", false, 4, 0, 0, false, 8}};
+
+typedef struct ball {
+    double x, y, radius;
+} ball;
+enum { OBJECTS = SHADOW_SCENES + 4, BALLS = 5 };
+static const struct {
+    const char *name;
+    ball balls[BALLS];
+    bool plate;
+} made[OBJECTS - SHADOW_SCENES] = {
+    {"dumbbell", {{-0.7, 0, 0.3}, {0.7, 0, 0.3}}, false},
+    {"touching", {{-0.5, 0, 0.5}, {0.5, 0, 0.5}}, false},
+    {"L", {{0, 0, 0.2}, {0.4, 0, 0.2}, {0.8, 0, 0.2}, {0, 0.4, 0.2}, {0, 0.8, 0.2}}, false},
+    {"plate", {{0, 0, 0}}, true},
+};
 
 typedef struct object {
+    const char *name;
     alb_mesh mesh;
     alb_tracer tracer;
     alb_shadow_sphere sphere;
@@ -59,7 +79,7 @@ static void look(double out[16], const alb_tracer *tracer, alb_vector from, int 
     }
 }
 
-static bool create(object *o, int scene_index, alb_error *error)
+static bool cut_out(alb_mesh *mesh, int scene_index, alb_error *error)
 {
     alb_scene scene;
     if (!shadow_scenes[scene_index].create(&scene, 7, error))
@@ -68,13 +88,40 @@ static bool create(object *o, int scene_index, alb_error *error)
     const uint32_t first = (uint32_t)range->first_vertex;
     bool ok = true;
     for (size_t v = 0; ok && v < range->vertex_count; v++)
-        ok = alb_mesh_add_vertex(&o->mesh, scene.mesh.vertices[first + v], error);
+        ok = alb_mesh_add_vertex(mesh, scene.mesh.vertices[first + v], error);
     for (size_t f = 0; ok && f < scene.mesh.face_count; f++) {
         const uint32_t *v = scene.mesh.faces[f];
         if (v[0] >= first && v[0] - first < range->vertex_count)
-            ok = alb_mesh_add_face(&o->mesh, v[0] - first, v[1] - first, v[2] - first, 0, error);
+            ok = alb_mesh_add_face(mesh, v[0] - first, v[1] - first, v[2] - first, 0, error);
     }
     alb_scene_free(&scene);
+    return ok;
+}
+
+static bool add_ball(alb_mesh *mesh, ball b, alb_error *error)
+{
+    alb_mesh one = {0};
+    const bool ok = alb_shape_sphere(&one, &(alb_sphere){{b.x, b.y, 0}, b.radius, 4, false}, error) &&
+                    alb_mesh_append(mesh, &one, 1, (alb_vector){0}, error);
+    alb_mesh_free(&one);
+    return ok;
+}
+
+static bool make(alb_mesh *mesh, int which, alb_error *error)
+{
+    bool ok = true;
+    for (int n = 0; ok && n < BALLS && made[which].balls[n].radius > 0; n++)
+        ok = add_ball(mesh, made[which].balls[n], error);
+    for (int n = 0; ok && made[which].plate && n < 25; n++)
+        ok = add_ball(mesh, (ball){0.3 * (n % 5 - 2), 0.3 * (n / 5 - 2), 0.15}, error);
+    return ok;
+}
+
+static bool create(object *o, int index, alb_error *error)
+{
+    const int which = index - SHADOW_SCENES;
+    o->name = which < 0 ? shadow_scenes[index].name : made[which].name;
+    bool ok = which < 0 ? cut_out(&o->mesh, index, error) : make(&o->mesh, which, error);
     ok = ok && alb_tracer_create(&o->tracer, &o->mesh, error) &&
          alb_shadow_sphere_follow(&o->sphere, o->mesh.vertices, o->mesh.vertex_count, "model", error) &&
          (o->full = calloc(FULL * 386 * 16, sizeof *o->full)) != NULL;
@@ -125,7 +172,7 @@ static bool measure(object *o, int way, alb_error *error)
     alb_shadow_laws laws = {0};
     bool ok = true;
     settings.order = ways[way].order, settings.outer = ways[way].outer, settings.inner = ways[way].inner;
-    settings.far = ways[way].far;
+    settings.far = ways[way].far, settings.cells = ways[way].cells;
     if (settings.outer)
         ok = alb_shadow_laws_create(&laws, settings.order, ways[way].paper, error) &&
              alb_shadow_field_create(&field, &settings, &o->mesh, NULL, "model", error) &&
@@ -194,15 +241,15 @@ static bool chart(const char *path, object *objects, alb_error *error)
 
 int main(int argc, char **argv)
 {
-    static object objects[SHADOW_SCENES];
+    static object objects[OBJECTS];
     alb_error error = {0};
     bool ok = true;
     printf("%-8s %-20s %9s %9s %9s %9s\n", "", "distance", ".5 - .9", "1 - 2", "2.7 - 8", "all");
-    for (int s = 0; ok && s < SHADOW_SCENES; s++) {
+    for (int s = 0; ok && s < OBJECTS; s++) {
         ok = create(&objects[s], s, &error);
         for (int w = 0; ok && w < WAYS; w++) {
             ok = measure(&objects[s], w, &error);
-            printf("%-8s %-20s", shadow_scenes[s].name, ways[w].name);
+            printf("%-8s %-20s", objects[s].name, ways[w].name);
             for (int k = 0; k < RANGES; k++)
                 printf(" %9.4f", over_range(&objects[s], w, range_ends[k]));
             printf("\n");
