@@ -13,9 +13,11 @@
 // sight); what the variance along it adds, the kernel knows (scatter_kernel.c).
 #include "render/scatter_links.h"
 #include "base/memory.h"
+#include "base/progress.h"
 #include "base/vector_clones.h"
 #include "render/scatter_block.h"
 #include <float.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -620,11 +622,14 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
 {
     bool failed = false;
     uint32_t *trees = NULL;
+    long done = 0;
+    alb_progress progress;
     *links = (alb_links){0};
     if (!lay_blocks(links, &trees, forest, error)) {
         alb_links_free(links);
         return false;
     }
+    alb_progress_begin(&progress, "scattering", (long)links->block_count);
 #pragma omp parallel reduction(|| : failed)
     {
         workspace work = {0};
@@ -645,6 +650,9 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
                         .row_count = block->row_count,
                         .work = &work};
             link_block(block, &v, own);
+            const long so_far = __atomic_add_fetch(&done, 1, __ATOMIC_RELAXED);
+            if (omp_get_thread_num() == 0)
+                alb_progress_at(&progress, so_far);
         }
         failed = failed || work.found.failed;
         free(work.wishes);
@@ -655,6 +663,7 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
         alb_optical_workspace_free(&work.paths);
         alb_found_links_free(&work.found);
     }
+    alb_progress_end(&progress);
     free(trees);
     if (failed) {
         alb_links_free(links);

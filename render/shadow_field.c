@@ -14,7 +14,7 @@
 #include <string.h>
 
 const alb_shadow_settings alb_shadow_defaults = {
-    .order = 4, .cells = 8, .pixels = 64, .distance = 1.1, .outer = 1, .rays = 512, .probes = 1200, .cluster = 0.04};
+    .order = 4, .cells = 8, .pixels = 64, .distance = 1.1, .outer = 1, .rays = 256, .probes = 1200, .cluster = 0.04};
 const alb_shadow_settings alb_shadow_light_settings = {
     .order = 4, .cells = 8, .pixels = 40, .distance = 1.1, .outer = 6};
 // Radii of 1, 2, 3 inner shells from outside inwards; of the outer ones over the first one's; of the far one.

@@ -31,7 +31,7 @@ typedef struct alb_shadow_settings {
     int probes;      // on the object's own surface (shadow_surface.h), 0 to ALB_SHADOW_PROBES_MAX; occlusion only
     double cluster;  // vertices within about so many radii move as one in pictures from outside; 0: each for itself
 } alb_shadow_settings;
-// Order 4, 8 cells, 64 pixels, one shell at 1.1 radii, none inside or far, 512 rays, 1200 probes, 0.04.
+// Order 4, 8 cells, 64 pixels, one shell at 1.1 radii, none inside or far, 256 rays, 1200 probes, 0.04.
 extern const alb_shadow_settings alb_shadow_defaults;
 // Six shells and 40 pixels: what a light shows of itself changes with the distance more than a silhouette does.
 extern const alb_shadow_settings alb_shadow_light_settings;
