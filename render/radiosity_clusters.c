@@ -3,7 +3,7 @@
 // back. Q is the mean over a cluster's area; what falls on the clusters of what they send out, b, is
 //     g = (I - F_c S_c)^-1 F_c b
 // F_c takes 256 of the rays of a cluster's patches, by a lattice over area and over the sorted row of each patch; S_c
-// the row sum of S' times the mean over 48 sources a channel, drawn from the rows of S' likewise. The coarse solution
+// the row sum of S' times the mean over 32 sources a channel, drawn from the rows of S' likewise. The coarse solution
 // is a guess that the solver corrects: what it gets wrong costs products, not accuracy.
 #include "render/radiosity_clusters.h"
 #include "base/memory.h"

@@ -18,7 +18,7 @@ typedef struct alb_clusters {
     alb_rgb *bounced, *right;      // scratch of a solution
 } alb_clusters;
 
-enum { ALB_CLUSTER_RAYS = 256, ALB_CLUSTER_SOURCES = 48 };
+enum { ALB_CLUSTER_RAYS = 256, ALB_CLUSTER_SOURCES = 32 };
 
 // About 16 patches each, fewer in narrow gaps, of one material and one main direction. row: scratch for the longest row
 // of the factors.

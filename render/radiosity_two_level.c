@@ -28,7 +28,7 @@ typedef struct run {
     alb_rgb *radiosity, *light, *rest; // B; E + h, later z; F B - h
     alb_rgb *even, *sent, *settled;    // of clusters: means, what they send out, and the coarse solution
     alb_rgb *along[STEPS], *sends[STEPS];
-    double bound[3]; // of the residual per length of rest; 0: a dark channel
+    double bound[3]; // of the residual per length of sqrt(s) rest; 0: a dark channel
     double floor;
 } run;
 
@@ -46,7 +46,7 @@ static void find_bounds(run *r)
         for (int c = 0; c < 3; c++)
             squares[c] += clusters->areas_mm2[k] * r->sent[k][c] * r->sent[k][c];
     for (int c = 0; c < 3; c++)
-        r->bound[c] = squares[c] > 0 ? rows[c] * sqrt(r->space.total_mm2 / squares[c]) : 0;
+        r->bound[c] = squares[c] > 0 ? sqrt(rows[c] * r->space.total_mm2 / squares[c]) : 0;
 }
 
 static double worst_of(const run *r, const double length[3])
@@ -55,11 +55,13 @@ static double worst_of(const run *r, const double length[3])
 }
 
 // Notes the rest after a product.
-static void note(run *r, const double length[3])
+static void note(run *r)
 {
-    double size[3];
+    double size[3], length[3];
     alb_radiosity_report *report = r->report;
     alb_space_norm(size, &r->space, (const alb_rgb *)r->radiosity);
+    alb_space_weighted_norm(length, &r->space, (const alb_rgb *)r->rest,
+                            (const alb_rgb *)r->equations->scatter->row_sums);
     r->floor = ALB_RESIDUAL_LEAST * fmax(1, worst_of(r, size));
     report->residual = report->history[report->iterations++] = worst_of(r, length);
 }
@@ -120,7 +122,6 @@ static void swap(alb_rgb **a, alb_rgb **b)
 // B and the rest of h, which is in r->light.
 static void settle(run *r)
 {
-    double length[3];
     const size_t n = r->space.count;
     memcpy(r->rest, r->light, n * sizeof *r->rest);
     for (size_t p = 0; r->irradiance && p < n; p++)
@@ -131,9 +132,9 @@ static void settle(run *r)
         for (int c = 0; c < 3; c++)
             r->radiosity[p][c] += r->exitance[p][c];
     alb_form_factors_apply(r->light, r->equations->factors, (const alb_rgb *)r->radiosity);
-    alb_space_add(length, &r->space, r->light, minus_one, &r->rest, 1);
+    alb_space_add(NULL, &r->space, r->light, minus_one, &r->rest, 1);
     swap(&r->light, &r->rest);
-    note(r, length);
+    note(r);
 }
 
 // along[k] orthogonal to those before and one long, sends[k] with it.
@@ -157,7 +158,7 @@ static void orthonormalise(run *r, int k)
 
 static bool step(run *r, int k, alb_error *error)
 {
-    double factors[1][3], length[3];
+    double factors[1][3];
     const size_t n = r->space.count;
     if (!r->along[k] && (!(r->along[k] = alb_allocate(n, sizeof(alb_rgb), error)) ||
                          !(r->sends[k] = alb_allocate(n, sizeof(alb_rgb), error))))
@@ -174,8 +175,8 @@ static bool step(run *r, int k, alb_error *error)
     alb_space_add(NULL, &r->space, r->radiosity, (const double(*)[3])factors, &r->sends[k], 1);
     for (int c = 0; c < 3; c++)
         factors[0][c] = -factors[0][c];
-    alb_space_add(length, &r->space, r->rest, (const double(*)[3])factors, &r->along[k], 1);
-    note(r, length);
+    alb_space_add(NULL, &r->space, r->rest, (const double(*)[3])factors, &r->along[k], 1);
+    note(r);
     return true;
 }
 

@@ -175,6 +175,22 @@ void alb_space_norm(double out[3], const alb_space *space, const alb_rgb *a)
     root(out);
 }
 
+void alb_space_weighted_norm(double out[3], const alb_space *space, const alb_rgb *a, const alb_rgb *weights)
+{
+#pragma omp parallel for schedule(static) if (is_large(space))
+    for (size_t block = 0; block < blocks_of(space); block++) {
+        double weighed[ROWS][3];
+        const size_t first = block * ROWS, rows = rows_of(space, block);
+        weigh(weighed, a + first, space->areas_mm2 + first, rows);
+        for (size_t i = 0; i < rows; i++)
+            for (int c = 0; c < 3; c++)
+                weighed[i][c] *= weights[first + i][c];
+        dot_block(space->partial[block][0], weighed[0], a[first], 3 * rows);
+    }
+    gather((double(*)[3])out, space, 1);
+    root(out);
+}
+
 void alb_space_mean(double out[3], const alb_space *space, const alb_rgb *a)
 {
 #pragma omp parallel for schedule(static) if (is_large(space))

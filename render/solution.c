@@ -18,7 +18,14 @@ const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "ligh
 
 // A change of the direct light, |E - E'| / |E|, below which the last solution is the better start.
 static const double small_change = 0.005;
-static const double scatter_error = 0.005; // relative, of what even light sends out
+
+// Asked of scattering, relative, of what even light sends out: half of what is asked of all between 0.2 and 1 percent.
+// No more, so that coarse links make no energy; no less, for their memory.
+static double scatter_error(const alb_scene *scene)
+{
+    return 0.005 * (scene->error_percent > 0 ? fmin(fmax(scene->error_percent, 0.2), 1) : 1);
+}
+
 static const alb_solver default_solver = ALB_SOLVER_TWO_LEVEL;
 
 static bool light_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
@@ -62,7 +69,7 @@ static bool check_scattering(alb_solution *s, const alb_scene *scene, alb_error 
 
 static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
-    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, scatter_error, error))
+    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, scatter_error(scene), error))
         return false;
     s->bytes[ALB_STAGE_SCATTERING] = alb_scatter_bytes(&s->scatter);
     return check_scattering(s, scene, error);
@@ -164,7 +171,7 @@ static bool take_stock(alb_solution *s, const alb_scene *scene, alb_error *error
     s->bound = alb_radiosity_bound(&s->equations, &s->report, (const double(*)[3])s->radiosity);
     if (!alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, sky, error))
         return false;
-    const double scattered_percent = s->scatter.body_count ? 100 * scatter_error : 0;
+    const double scattered_percent = s->scatter.body_count ? 100 * scatter_error(scene) : 0;
     s->stated_error_percent = hypot(s->rays_error_percent, scattered_percent) + 100 * s->bound;
     return take_irradiance(s, scene, error);
 }
