@@ -4,7 +4,9 @@
 // A vertex v takes D from its probes p nearest along the surface, weights (1/s_p - 1/s)^2 (Franke & Little), s the
 // distance of the next one: they fall to zero where a probe leaves the set. Along an edge the distance is its length,
 // longer where the surface turns: s^2 = |e|^2 + (bend R |n - n'|)^2, R the object's reach, so that the two sides of a
-// crease are far apart. Probes are drawn one by one, each the vertex farthest from those before.
+// crease are far apart. A probe whose rays are all blocked lies inside another part of the object, where nothing is
+// seen of it; vertices around, which may be outside, leave it out. Probes are drawn one by one, each the vertex
+// farthest from those before.
 //
 // Stops being true where what is hidden changes between neighbouring probes; neighbours are those of the mesh as it was
 // when the surface was made.
@@ -151,8 +153,9 @@ static void weigh(uint32_t *neighbours, float *weights, const label *labels, int
 {
     const double last = count == LABELS ? labels[LABELS - 1].distance : 2 * labels[count - 1].distance;
     double share[NEIGHBOURS] = {1}, sum = 0;
+    for (int k = 0; k < NEIGHBOURS; k++)
+        neighbours[k] = labels[k < count ? k : 0].probe;
     for (int k = 0; k < NEIGHBOURS && k < count; k++) {
-        neighbours[k] = labels[k].probe;
         if (labels[0].distance > 0 && last > labels[0].distance)
             share[k] = pow(1 / labels[k].distance - 1 / last, 2);
         sum += share[k];
@@ -201,7 +204,8 @@ bool alb_shadow_surface_create(alb_shadow_surface *s, const alb_mesh *mesh, cons
               connect(s, &g, error);
     ok = ok && alb_tracer_create_moving(&s->tracer, &s->mesh, error) &&
          (s->seen = alb_allocate(VALUES * s->probe_count, sizeof *s->seen, error)) &&
-         (s->axes = alb_allocate(3 * s->probe_count, sizeof *s->axes, error));
+         (s->axes = alb_allocate(3 * s->probe_count, sizeof *s->axes, error)) &&
+         (s->buried = alb_allocate(s->probe_count, sizeof *s->buried, error));
     free_graph(&g);
     if (!ok)
         alb_shadow_surface_free(s);
@@ -218,6 +222,7 @@ void alb_shadow_surface_free(alb_shadow_surface *s)
     free(s->hidden);
     free(s->seen);
     free(s->axes);
+    free(s->buried);
     *s = (alb_shadow_surface){0};
 }
 
@@ -245,19 +250,37 @@ static void look(alb_shadow_surface *s, size_t p, const rays *r, alb_vector norm
     float sum[VALUES] = {0};
     double world_from_axis[3][3];
     alb_sh_axis_rotation(world_from_axis, normal);
+    int blocked = 0;
     for (int q = 0; q < RAYS; q++) {
         const alb_vector d = r->directions[q];
         double to[3];
         for (int k = 0; k < 3; k++)
             to[k] = world_from_axis[k][0] * d.x + world_from_axis[k][1] * d.y + world_from_axis[k][2] * d.z;
         const alb_vector end = alb_add(from, alb_times(far_mm, (alb_vector){to[0], to[1], to[2]}));
-        if (alb_tracer_blocked(&s->tracer, from, end))
-            for (int i = 0; i < VALUES; i++)
-                sum[i] += r->basis[q][i];
+        if (!alb_tracer_blocked(&s->tracer, from, end))
+            continue;
+        blocked++;
+        for (int i = 0; i < VALUES; i++)
+            sum[i] += r->basis[q][i];
     }
+    s->buried[p] = blocked == RAYS;
     for (size_t i = 0; i < VALUES; i++)
         s->seen[i * count + p] = sum[i];
     s->axes[p] = (float)normal.x, s->axes[count + p] = (float)normal.y, s->axes[2 * count + p] = (float)normal.z;
+}
+
+// The weights of a vertex without its buried probes; where those are all that count, the others among the four alike.
+static void leave_out_buried(float out[NEIGHBOURS], const alb_shadow_surface *s, size_t vertex)
+{
+    float sum = 0, open = 0;
+    for (int k = 0; k < NEIGHBOURS; k++) {
+        const bool buried = s->buried[s->neighbours[vertex][k]];
+        out[k] = s->weights[vertex][k];
+        sum += buried ? 0 : out[k];
+        open += buried ? 0 : 1;
+    }
+    for (int k = 0; k < NEIGHBOURS && open > 0; k++)
+        out[k] = s->buried[s->neighbours[vertex][k]] ? 0 : sum > 0 ? out[k] / sum : 1 / open;
 }
 
 static void interpolate(alb_shadow_surface *s)
@@ -265,13 +288,16 @@ static void interpolate(alb_shadow_surface *s)
     const size_t count = s->probe_count;
     alb_sh_from_axis_batch(s->seen, s->seen, ALB_SHADOW_ORDER, s->axes, count, count);
 #pragma omp parallel for schedule(static)
-    for (size_t v = 0; v < s->mesh.vertex_count; v++)
+    for (size_t v = 0; v < s->mesh.vertex_count; v++) {
+        float weights[NEIGHBOURS];
+        leave_out_buried(weights, s, v);
         for (size_t i = 0; i < VALUES; i++) {
             float sum = 0;
             for (int k = 0; k < NEIGHBOURS; k++)
-                sum += s->weights[v][k] * s->seen[i * count + s->neighbours[v][k]];
+                sum += weights[k] * s->seen[i * count + s->neighbours[v][k]];
             s->hidden[v][i] = sum;
         }
+    }
 }
 
 bool alb_shadow_surface_sample(alb_shadow_surface *s, const alb_vector *vertices, const alb_vector *normals,

@@ -16,6 +16,7 @@ typedef struct alb_shadow_surface {
     float (*weights)[ALB_SHADOW_PROBE_NEIGHBOURS];       // sum 1
     float (*hidden)[ALB_SHADOW_VALUES]; // of each vertex: coefficients of max(0, n.d) where the object hides d
     float *seen, *axes;                 // of the probes: [value][probe], [3][probe]
+    bool *buried;                       // of the probes: all they see is the object
     alb_tracer tracer;                  // the surface stays at its address
 } alb_shadow_surface;
 

@@ -106,6 +106,30 @@ static void parts_have_probes_of_their_own(void **state)
     alb_mesh_free(&two);
 }
 
+// F11 on the surface: a small ball half sunk in a large one. Its probes inside see only that; the vertices outside,
+// which lie between those and others, do not take it for what they see.
+static void buried_probes_are_left_out(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_mesh ball = {0}, two = {0};
+    check_ok(alb_shape_sphere(&ball, &(alb_sphere){{0}, 1, 3, false}, &error), &error);
+    check_ok(alb_mesh_append(&two, &ball, 1, (alb_vector){0}, &error), &error);
+    check_ok(alb_mesh_append(&two, &ball, 3, (alb_vector){3, 0, 0}, &error), &error);
+    alb_shadow_surface surface;
+    sample(&surface, &two, 300);
+    size_t buried = 0;
+    for (size_t p = 0; p < surface.probe_count; p++)
+        buried += surface.buried[p];
+    assert_in_range(buried, 20, 150);
+    for (size_t v = 0; v < ball.vertex_count; v++)
+        if (alb_length(alb_sub(two.vertices[v], (alb_vector){3, 0, 0})) > 3.02) // in the crease half and more is hidden
+            check_below(share(&surface, v), 0.8);
+    alb_shadow_surface_free(&surface);
+    alb_mesh_free(&ball);
+    alb_mesh_free(&two);
+}
+
 // Irradiance on the model against 1024 rays, rms in percent of its mean.
 static double model_error(const alb_shadow_stage *stage, const alb_scene *scene)
 {
@@ -210,9 +234,8 @@ static void same_bytes_there_and_back(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(floor_beside_a_wall),
-        cmocka_unit_test(parts_have_probes_of_their_own),
-        cmocka_unit_test(receivers_in_the_bounding_sphere),
+        cmocka_unit_test(floor_beside_a_wall),        cmocka_unit_test(parts_have_probes_of_their_own),
+        cmocka_unit_test(buried_probes_are_left_out), cmocka_unit_test(receivers_in_the_bounding_sphere),
         cmocka_unit_test(same_bytes_there_and_back),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
