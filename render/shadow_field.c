@@ -66,11 +66,12 @@ static bool check(const alb_shadow_settings *s, bool shines, const char *name, a
         !(s->cluster >= 0 && s->cluster <= 0.5))
         return alb_fail(
             error, ALB_BAD_DATA,
-            "%s: a shadow field of order %d with %d cells, %d shells outside, %d inside of %d rays, %d probes, clusters of "
+            "%s: a shadow field of order %d with %d cells, %d shells outside, %d inside of %d rays, %d probes, "
+            "clusters of "
             "%g radii: orders 2 to %d, cells 1 to %d, 1 to %d shells outside, up to %d inside of 16 to 65536 rays, up "
             "to %d probes, clusters to 0.5 exist",
-            name, s->order, s->cells, s->outer, s->inner, s->rays, s->probes, s->cluster, ALB_SH_ORDER_MAX, ALB_SHADOW_CELLS_MAX,
-            ALB_SHADOW_OUTER_MAX, ALB_SHADOW_INNER_MAX, ALB_SHADOW_PROBES_MAX);
+            name, s->order, s->cells, s->outer, s->inner, s->rays, s->probes, s->cluster, ALB_SH_ORDER_MAX,
+            ALB_SHADOW_CELLS_MAX, ALB_SHADOW_OUTER_MAX, ALB_SHADOW_INNER_MAX, ALB_SHADOW_PROBES_MAX);
     if (s->far && !(s->distance * outer_ratios[s->outer - 1] < far_radius))
         return alb_fail(error, ALB_BAD_DATA, "%s: %d shells outside from %g radii on reach the far one at %g", name,
                         s->outer, s->distance, far_radius);

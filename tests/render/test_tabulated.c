@@ -104,7 +104,8 @@ static void what_is_wrong_is_named(void **state)
     remove(json);
 }
 
-// The demonstration's tables are dipoles, in six digits: between lines 0.02 mm or 6 % apart |(ln S)''| h^2/8 is below 0.4 %.
+// The demonstration's tables are dipoles, in six digits: between lines 0.02 mm or 6 % apart |(ln S)''| h^2/8 is below
+// 0.4 %.
 static void the_demonstration_is_its_dipole(void **state)
 {
     (void)state;
