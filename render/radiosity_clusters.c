@@ -114,15 +114,16 @@ static size_t cut_few(uint16_t *cluster, const placed *sorted, size_t n)
 }
 
 // The hits of a cluster's rays: at equal steps through the area of its members, and through the row of each.
-static void take_hits(alb_clusters *out, size_t which, const placed *members, size_t count,
-                      const alb_form_factors *factors, uint32_t *row)
+static void take_hits(alb_clusters *out, size_t which, const alb_form_factors *factors, uint32_t *row)
 {
+    const uint32_t *members = out->members + out->first[which];
+    const size_t count = out->first[which + 1] - out->first[which];
     const double step = out->areas_mm2[which] / ALB_CLUSTER_RAYS;
     uint16_t *hits = out->hits + which * ALB_CLUSTER_RAYS;
     double before = 0;
     size_t q = 0;
     for (size_t k = 0; k < count; k++) {
-        const uint32_t patch = members[k].patch;
+        const uint32_t patch = members[k];
         const double area = out->patch_areas_mm2[patch], rays = alb_form_factors_rays(factors, patch);
         alb_form_factors_row(row, factors, patch);
         for (; q < ALB_CLUSTER_RAYS && (((double)q + 0.5) * step < before + area || k + 1 == count); q++) {
@@ -137,14 +138,14 @@ static void take_hits(alb_clusters *out, size_t which, const placed *members, si
 static void fill(alb_clusters *out, const placed *sorted, const alb_form_factors *factors, uint32_t *row)
 {
     const size_t n = out->patch_count;
-    for (size_t p = 0; p < n; p++)
-        out->areas_mm2[out->cluster[p]] += out->patch_areas_mm2[p];
-    for (size_t first = 0, end; first < n; first = end) {
-        const uint16_t which = out->cluster[sorted[first].patch];
-        for (end = first + 1; end < n && out->cluster[sorted[end].patch] == which;)
-            end++;
-        take_hits(out, which, sorted + first, end - first, factors, row);
+    for (size_t k = 0; k < n; k++) {
+        const uint16_t which = out->cluster[sorted[k].patch];
+        out->members[k] = sorted[k].patch;
+        out->first[which + 1] = (uint32_t)k + 1;
+        out->areas_mm2[which] += out->patch_areas_mm2[sorted[k].patch];
     }
+    for (size_t which = 0; which < out->count; which++)
+        take_hits(out, which, factors, row);
 }
 
 // How many sources each patch has a say in, at equal steps through the area of its cluster's members; as places of the
@@ -204,7 +205,9 @@ bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, con
         qsort(sorted, n, sizeof *sorted, by_key);
         clusters->count = cut_few(clusters->cluster, sorted, n);
         const size_t count = clusters->count;
-        ok = (clusters->areas_mm2 = alb_allocate(count, sizeof *clusters->areas_mm2, error)) &&
+        ok = (clusters->members = alb_allocate(n, sizeof *clusters->members, error)) &&
+             (clusters->first = alb_allocate(count + 1, sizeof *clusters->first, error)) &&
+             (clusters->areas_mm2 = alb_allocate(count, sizeof *clusters->areas_mm2, error)) &&
              (clusters->hits = alb_allocate(count * ALB_CLUSTER_RAYS, sizeof *clusters->hits, error)) &&
              (clusters->kept = alb_allocate(count, sizeof *clusters->kept, error)) &&
              (clusters->values = alb_allocate(count + 1, sizeof *clusters->values, error)) &&
@@ -226,6 +229,8 @@ bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, con
 void alb_clusters_free(alb_clusters *clusters)
 {
     free(clusters->cluster);
+    free(clusters->members);
+    free(clusters->first);
     free(clusters->areas_mm2);
     free(clusters->hits);
     free(clusters->kept);
@@ -240,7 +245,8 @@ void alb_clusters_free(alb_clusters *clusters)
 
 size_t alb_clusters_bytes(const alb_clusters *clusters)
 {
-    return clusters->patch_count * sizeof *clusters->cluster +
+    return clusters->patch_count * (sizeof *clusters->cluster + sizeof *clusters->members) +
+           (clusters->count + 1) * sizeof *clusters->first +
            clusters->count *
                (ALB_CLUSTER_RAYS * sizeof *clusters->hits + 3 * ALB_CLUSTER_SOURCES * sizeof *clusters->sources[0] +
                 sizeof *clusters->spreads + sizeof(double) + 3 * sizeof(alb_rgb) + sizeof *clusters->values);
@@ -248,13 +254,15 @@ size_t alb_clusters_bytes(const alb_clusters *clusters)
 
 void alb_clusters_average(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *values)
 {
-    memset(out, 0, clusters->count * sizeof *out);
-    for (size_t p = 0; p < clusters->patch_count; p++)
+#pragma omp parallel for schedule(static) if (clusters->patch_count > 8192)
+    for (size_t k = 0; k < clusters->count; k++) {
+        double sum[3] = {0};
+        for (uint32_t m = clusters->first[k]; m < clusters->first[k + 1]; m++)
+            for (int c = 0; c < 3; c++)
+                sum[c] += clusters->patch_areas_mm2[clusters->members[m]] * values[clusters->members[m]][c];
         for (int c = 0; c < 3; c++)
-            out[clusters->cluster[p]][c] += clusters->patch_areas_mm2[p] * values[p][c];
-    for (size_t k = 0; k < clusters->count; k++)
-        for (int c = 0; c < 3; c++)
-            out[k][c] /= clusters->areas_mm2[k];
+            out[k][c] = sum[c] / clusters->areas_mm2[k];
+    }
 }
 
 void alb_clusters_refresh(alb_clusters *clusters, const alb_scatter *scatter)

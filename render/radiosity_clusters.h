@@ -7,6 +7,7 @@
 typedef struct alb_clusters {
     size_t patch_count, count;
     uint16_t *cluster;             // of each patch
+    uint32_t *members, *first;     // patches of cluster k: members[first[k] .. first[k + 1])
     double *areas_mm2;             // of each cluster
     uint16_t *hits;                // [cluster * ALB_CLUSTER_RAYS + q]: cluster; `count` for the sky and backs
     uint16_t *sources[3];          // [channel][cluster * ALB_CLUSTER_SOURCES + q]: whose light leaves from here

@@ -119,18 +119,22 @@ static void swap(alb_rgb **a, alb_rgb **b)
     *b = kept;
 }
 
+static void add(alb_rgb *to, const alb_rgb *from, size_t n)
+{
+#pragma omp parallel for schedule(static)
+    for (size_t p = 0; p < (from ? n : 0); p++)
+        for (int c = 0; c < 3; c++)
+            to[p][c] += from[p][c];
+}
+
 // B and the rest of h, which is in r->light.
 static void settle(run *r)
 {
     const size_t n = r->space.count;
     memcpy(r->rest, r->light, n * sizeof *r->rest);
-    for (size_t p = 0; r->irradiance && p < n; p++)
-        for (int c = 0; c < 3; c++)
-            r->light[p][c] += r->irradiance[p][c];
+    add(r->light, r->irradiance, n);
     alb_scatter_apply(r->radiosity, r->equations->scatter, (const alb_rgb *)r->light);
-    for (size_t p = 0; r->exitance && p < n; p++)
-        for (int c = 0; c < 3; c++)
-            r->radiosity[p][c] += r->exitance[p][c];
+    add(r->radiosity, r->exitance, n);
     alb_form_factors_apply(r->light, r->equations->factors, (const alb_rgb *)r->radiosity);
     alb_space_add(NULL, &r->space, r->light, minus_one, &r->rest, 1);
     swap(&r->light, &r->rest);

@@ -279,6 +279,8 @@ static void add_child(alb_scatter_node *sum, const float *light, const float cen
     }
 }
 
+enum { TASK_LEAVES = 8192 };
+
 // Sums by halves: rounding grows as the logarithm of the number of leaves.
 static void gather(alb_forest *forest, const double (*irradiance)[3], uint32_t node, uint32_t first_leaf,
                    uint32_t count)
@@ -291,10 +293,15 @@ static void gather(alb_forest *forest, const double (*irradiance)[3], uint32_t n
     }
     const uint32_t left = alb_left_count(count), counts[2] = {left, count - left};
     const uint32_t nodes[2] = {node + 1, node + left}, leaves[2] = {first_leaf, first_leaf + left};
-#pragma omp task if (count > 8192)
-    gather(forest, irradiance, nodes[0], leaves[0], counts[0]);
-    gather(forest, irradiance, nodes[1], leaves[1], counts[1]);
+    if (count > TASK_LEAVES) { // even a task that is not put off costs as much as a node
+#pragma omp task
+        gather(forest, irradiance, nodes[0], leaves[0], counts[0]);
+        gather(forest, irradiance, nodes[1], leaves[1], counts[1]);
 #pragma omp taskwait
+    } else {
+        gather(forest, irradiance, nodes[0], leaves[0], counts[0]);
+        gather(forest, irradiance, nodes[1], leaves[1], counts[1]);
+    }
     alb_scatter_node *sum = &forest->nodes[node];
     for (int c = 0; c < 3; c++)
         sum->light[c] = sum->moments[0][c] = sum->moments[1][c] = sum->moments[2][c] = 0;
