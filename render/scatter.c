@@ -26,7 +26,7 @@
 #include <string.h>
 
 // Links of one row on a plane: so many that smooth light leaves within half the error wanted or less (render.scatter).
-static double links_for(double error_wanted) { return fmin(fmax(0.255 / error_wanted, 20), 3000); }
+static double links_for(double error_wanted) { return fmin(fmax(0.28 / error_wanted, 20), 3000); }
 
 // How much light comes from beyond where paths are measured: all that is there counts as just there, or where it is if
 // that is further. A sheet that is rolled up has much there that lies near.
