@@ -150,39 +150,38 @@ static void fill(alb_clusters *out, const placed *sorted, const alb_form_factors
 
 // How many sources each patch has a say in, at equal steps through the area of its cluster's members; as places of the
 // first ones, in the order of the patches.
-static void share_sources(uint32_t *first, const alb_clusters *clusters, const placed *sorted)
+static void share_sources(uint32_t *first, const alb_clusters *clusters)
 {
-    double before = 0;
-    for (size_t k = 0; k < clusters->patch_count; k++) {
-        const uint32_t patch = sorted[k].patch;
-        const uint16_t which = clusters->cluster[patch];
+    for (size_t which = 0; which < clusters->count; which++) {
         const double scale = ALB_CLUSTER_SOURCES / clusters->areas_mm2[which];
-        if (!k || clusters->cluster[sorted[k - 1].patch] != which)
-            before = 0;
-        const double after = before + clusters->patch_areas_mm2[patch];
-        const bool last = k + 1 == clusters->patch_count || clusters->cluster[sorted[k + 1].patch] != which;
-        first[patch + 1] =
-            (last ? ALB_CLUSTER_SOURCES : (uint32_t)(after * scale + 0.5)) - (uint32_t)(before * scale + 0.5);
-        before = after;
+        const uint32_t end = clusters->first[which + 1];
+        double before = 0;
+        for (uint32_t m = clusters->first[which]; m < end; m++) {
+            const double after = before + clusters->patch_areas_mm2[clusters->members[m]];
+            first[clusters->members[m] + 1] = (m + 1 == end ? ALB_CLUSTER_SOURCES : (uint32_t)(after * scale + 0.5)) -
+                                              (uint32_t)(before * scale + 0.5);
+            before = after;
+        }
     }
     for (size_t p = 0; p < clusters->patch_count; p++)
         first[p + 1] += first[p];
 }
 
-static bool take_sources(alb_clusters *clusters, const placed *sorted, const alb_scatter *scatter, alb_error *error)
+static bool take_sources(alb_clusters *clusters, const alb_scatter *scatter, alb_error *error)
 {
     const size_t n = clusters->patch_count, count = clusters->count * ALB_CLUSTER_SOURCES;
     uint32_t *first = alb_allocate(n + 1, sizeof *first, error),
              *patches = first ? alb_allocate(count, sizeof *patches, error) : NULL;
     bool ok = patches != NULL;
     if (ok)
-        share_sources(first, clusters, sorted);
+        share_sources(first, clusters);
     for (int c = 0; ok && c < 3; c++) {
         uint16_t *out = clusters->sources[c] = alb_allocate(count, sizeof *out, error);
         ok = out && alb_scatter_sample(patches, scatter, first, c, error);
-        for (size_t k = 0; ok && k < n; k++) {
-            const uint16_t which = clusters->cluster[sorted[k].patch];
-            for (uint32_t q = first[sorted[k].patch]; q < first[sorted[k].patch + 1]; q++) {
+        for (size_t m = 0; ok && m < n; m++) {
+            const uint32_t patch = clusters->members[m];
+            const uint16_t which = clusters->cluster[patch];
+            for (uint32_t q = first[patch]; q < first[patch + 1]; q++) {
                 *out = clusters->cluster[patches[q]];
                 clusters->spreads[which] |= *out++ != which;
             }
@@ -218,7 +217,7 @@ bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, con
     if (ok) {
         fill(clusters, sorted, factors, row);
         alb_clusters_refresh(clusters, scatter);
-        ok = take_sources(clusters, sorted, scatter, error);
+        ok = take_sources(clusters, scatter, error);
     }
     if (!ok)
         alb_clusters_free(clusters);

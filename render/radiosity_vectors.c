@@ -103,12 +103,15 @@ static void root(double out[3])
         out[c] = sqrt(out[c]);
 }
 
-// Squares of a block's rows into its partial sums.
-static void square_block(const alb_space *space, size_t block, const alb_rgb *a)
+// Squares of a block's rows, times weights (NULL: ones), into its partial sums.
+static void square_block(const alb_space *space, size_t block, const alb_rgb *a, const alb_rgb *weights)
 {
     double weighed[ROWS][3];
     const size_t first = block * ROWS, rows = rows_of(space, block);
     weigh(weighed, a + first, space->areas_mm2 + first, rows);
+    for (size_t i = 0; weights && i < rows; i++)
+        for (int c = 0; c < 3; c++)
+            weighed[i][c] *= weights[first + i][c];
     dot_block(space->partial[block][0], weighed[0], a[first], 3 * rows);
 }
 
@@ -121,7 +124,7 @@ void alb_space_add(double norm[3], const alb_space *space, alb_rgb *a, const dou
         for (int k = 0; k < count; k++)
             add_block(a[first], factors[k], b[k][first], 3 * rows);
         if (norm)
-            square_block(space, block, (const alb_rgb *)a);
+            square_block(space, block, (const alb_rgb *)a, NULL);
     }
     if (norm) {
         gather((double(*)[3])norm, space, 1);
@@ -157,7 +160,7 @@ void alb_space_residual(double norm[3], double mean[3], const alb_space *space, 
         for (size_t i = first; i < first + rows; i++)
             for (int c = 0; c < 3; c++)
                 r[i][c] += right[i][c] - x[i][c];
-        square_block(space, block, (const alb_rgb *)r);
+        square_block(space, block, (const alb_rgb *)r, NULL);
         mean_block(space, block, 1, (const alb_rgb *)r);
     }
     gather(sums, space, 2);
@@ -168,25 +171,14 @@ void alb_space_residual(double norm[3], double mean[3], const alb_space *space, 
 
 void alb_space_norm(double out[3], const alb_space *space, const alb_rgb *a)
 {
-#pragma omp parallel for schedule(static) if (is_large(space))
-    for (size_t block = 0; block < blocks_of(space); block++)
-        square_block(space, block, a);
-    gather((double(*)[3])out, space, 1);
-    root(out);
+    alb_space_weighted_norm(out, space, a, NULL);
 }
 
 void alb_space_weighted_norm(double out[3], const alb_space *space, const alb_rgb *a, const alb_rgb *weights)
 {
 #pragma omp parallel for schedule(static) if (is_large(space))
-    for (size_t block = 0; block < blocks_of(space); block++) {
-        double weighed[ROWS][3];
-        const size_t first = block * ROWS, rows = rows_of(space, block);
-        weigh(weighed, a + first, space->areas_mm2 + first, rows);
-        for (size_t i = 0; i < rows; i++)
-            for (int c = 0; c < 3; c++)
-                weighed[i][c] *= weights[first + i][c];
-        dot_block(space->partial[block][0], weighed[0], a[first], 3 * rows);
-    }
+    for (size_t block = 0; block < blocks_of(space); block++)
+        square_block(space, block, a, weights);
     gather((double(*)[3])out, space, 1);
     root(out);
 }

@@ -29,7 +29,7 @@ void alb_space_scale(const alb_space *space, alb_rgb *a, const double factor[3])
 // r = right + r - x, with its norm and its mean absolute value: the residual from r = K x.
 void alb_space_residual(double norm[3], double mean[3], const alb_space *space, alb_rgb *r, const alb_rgb *right,
                         const alb_rgb *x);
-// Area-weighted 2-norm; the same of sqrt(weights) a; mean over area of |a|.
+// Area-weighted 2-norm; the same of sqrt(weights) a (NULL: ones); mean over area of |a|.
 void alb_space_norm(double out[3], const alb_space *space, const alb_rgb *a);
 void alb_space_weighted_norm(double out[3], const alb_space *space, const alb_rgb *a, const alb_rgb *weights);
 void alb_space_mean(double out[3], const alb_space *space, const alb_rgb *a);

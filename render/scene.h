@@ -48,6 +48,11 @@ typedef struct alb_object {
     bool rigid;         // moves with all others that are, as one body
 } alb_object;
 
+static inline bool alb_object_owns(const alb_object *object, size_t vertex)
+{
+    return vertex >= object->first_vertex && vertex - object->first_vertex < object->vertex_count;
+}
+
 typedef struct alb_scene {
     alb_mesh mesh; // all objects, mm; groups index surfaces. Objects share no vertices
     alb_object *objects;

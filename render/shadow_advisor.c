@@ -29,11 +29,8 @@ static bool collect(alb_mesh *mesh, float (**radiance)[3], const alb_shadow_stag
         ok = alb_mesh_add_vertex(mesh, all->vertices[v], error);
     for (size_t f = 0; ok && f < all->face_count; f++) {
         bool used = false;
-        for (size_t i = 0; i < stage->occluder_count + stage->light_count && !used; i++) {
-            const alb_object *object = &scene->objects[stage->objects[i]];
-            used = all->faces[f][0] >= object->first_vertex &&
-                   all->faces[f][0] - object->first_vertex < object->vertex_count;
-        }
+        for (size_t i = 0; i < stage->occluder_count + stage->light_count && !used; i++)
+            used = alb_object_owns(&scene->objects[stage->objects[i]], all->faces[f][0]);
         const size_t count = mesh->face_count;
         ok = !used || alb_mesh_add_face(mesh, all->faces[f][0], all->faces[f][1], all->faces[f][2], 0, error);
         for (int c = 0; c < 3 && mesh->face_count > count; c++)
@@ -44,11 +41,9 @@ static bool collect(alb_mesh *mesh, float (**radiance)[3], const alb_shadow_stag
 
 static bool emits(const alb_shadow_stage *stage, const alb_scene *scene, size_t vertex)
 {
-    for (size_t i = stage->occluder_count; i < stage->occluder_count + stage->light_count; i++) {
-        const alb_object *object = &scene->objects[stage->objects[i]];
-        if (vertex >= object->first_vertex && vertex - object->first_vertex < object->vertex_count)
+    for (size_t i = stage->occluder_count; i < stage->occluder_count + stage->light_count; i++)
+        if (alb_object_owns(&scene->objects[stage->objects[i]], vertex))
             return true;
-    }
     return false;
 }
 

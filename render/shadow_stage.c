@@ -7,11 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool owns(const alb_object *object, const uint32_t face[3])
-{
-    return face[0] >= object->first_vertex && face[0] - object->first_vertex < object->vertex_count;
-}
-
 static bool emits(const alb_scene *scene, size_t face)
 {
     const double *e = scene->surfaces[scene->mesh.groups[face]].exitance;
@@ -27,7 +22,7 @@ static bool cut_out(alb_mesh *mesh, float (**radiance)[3], const alb_scene *scen
     for (size_t v = 0; ok && v < object->vertex_count; v++)
         ok = alb_mesh_add_vertex(mesh, all->vertices[object->first_vertex + v], error);
     for (size_t f = 0; ok && f < all->face_count; f++) {
-        if (!owns(object, all->faces[f]))
+        if (!alb_object_owns(object, all->faces[f][0]))
             continue;
         const size_t count = mesh->face_count;
         uint32_t at[3];
@@ -73,7 +68,7 @@ static bool find_lights(bool **shines, const alb_scene *scene, alb_error *error)
         return false;
     for (size_t f = 0; f < scene->mesh.face_count; f++)
         for (size_t o = 0; emits(scene, f) && o < scene->object_count; o++)
-            (*shines)[o] |= owns(&scene->objects[o], scene->mesh.faces[f]);
+            (*shines)[o] |= alb_object_owns(&scene->objects[o], scene->mesh.faces[f][0]);
     return true;
 }
 
@@ -239,12 +234,12 @@ bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb
         free_fields(stage);
         ok = create_fields(stage, scene, error);
         made_s = stage->transport_s;
+    } else if (ok) {
+        set_normals(stage->normals, mesh);
     }
     if (ok && !stage->light_count && !stage->sky_count)
         ok = alb_fail(error, ALB_BAD_DATA, "there is no light: no environment and no object that emits");
     ok = ok && alb_shadow_transport_follow(&stage->transport, mesh->vertices, error);
-    if (ok)
-        set_normals(stage->normals, mesh);
     for (size_t i = 0; ok && i < stage->occluder_count + stage->light_count; i++)
         ok = alb_shadow_field_sample(&stage->fields[i], mesh->vertices + scene->objects[stage->objects[i]].first_vertex,
                                      error);

@@ -16,11 +16,6 @@
 
 enum { STRATA = 24, RAYS = STRATA * STRATA, VALUES = ALB_SH_COUNT_MAX, SHARE = 1024 };
 
-static bool owns(const alb_object *object, size_t vertex)
-{
-    return vertex >= object->first_vertex && vertex - object->first_vertex < object->vertex_count;
-}
-
 static void number_rows(alb_shadow_transport *t, const alb_scene *scene)
 {
     for (size_t v = 0; v < t->vertex_count; v++)
@@ -38,7 +33,7 @@ static bool collect_casters(alb_mesh *casters, const alb_shadow_transport *t, co
         ok = alb_mesh_add_vertex(casters, all->vertices[v], error);
     for (size_t o = 0; ok && o < scene->object_count; o++)
         for (size_t f = 0; ok && t->of_body[o] && !scene->objects[o].receives_only && f < all->face_count; f++)
-            if (owns(&scene->objects[o], all->faces[f][0]))
+            if (alb_object_owns(&scene->objects[o], all->faces[f][0]))
                 ok = alb_mesh_add_face(casters, all->faces[f][0], all->faces[f][1], all->faces[f][2], 0, error);
     return ok;
 }
