@@ -1,8 +1,8 @@
 // Between nodes samples are interpolated bilinearly. In the world's frame that blurs an object by the angle between two
 // nodes as seen from its middle; a shell that is `along` first turns each node's sample with the rotation that takes
 // the node to the receiver along a great circle, and blurs only the parallax of the object's depth. In the frames of
-// the two axes that rotation is a turn about z alone, by the angle between the receiver's frame and the node's carried
-// there: it varies without a seam, though frames have one at their poles. Buried nodes count a thousandth.
+// the two axes that rotation is a turn about z alone, by the angle between them: it varies without a seam, though
+// frames have one at their poles.
 //
 // Stops being true where what is seen changes faster than bilinearly between nodes: 11 degrees for 8 cells.
 #include "render/shadow_field.h"
@@ -72,11 +72,6 @@ static void place_shells(alb_shadow_field *field)
     }
 }
 
-static size_t inner_nodes(const alb_shadow_field *field)
-{
-    return (size_t)field->settings.inner * (size_t)alb_shadow_grid_count((alb_shadow_grid){field->settings.cells});
-}
-
 bool alb_shadow_field_create(alb_shadow_field *field, const alb_shadow_settings *settings, const alb_mesh *mesh,
                              const float (*face_radiance)[3], const char *name, alb_error *error)
 {
@@ -87,7 +82,6 @@ bool alb_shadow_field_create(alb_shadow_field *field, const alb_shadow_settings 
         return false;
     place_shells(field);
     if ((field->samples = alb_allocate(field->sample_count, sizeof *field->samples, error)) &&
-        (field->buried = alb_allocate(inner_nodes(field), sizeof *field->buried, error)) &&
         alb_shadow_studio_create(field->studio, field, mesh, face_radiance, name, error))
         return true;
     alb_shadow_field_free(field);
@@ -100,14 +94,10 @@ void alb_shadow_field_free(alb_shadow_field *field)
         alb_shadow_studio_free(field->studio);
     free(field->studio);
     free(field->samples);
-    free(field->buried);
     *field = (alb_shadow_field){0};
 }
 
-size_t alb_shadow_field_bytes(const alb_shadow_field *field)
-{
-    return field->sample_count * sizeof *field->samples + inner_nodes(field) * sizeof *field->buried;
-}
+size_t alb_shadow_field_bytes(const alb_shadow_field *field) { return field->sample_count * sizeof(float); }
 
 // The directions x and y of the frame of an axis, found as rotations of batches find them.
 static void frame_of(alb_vector *x, alb_vector *y, alb_vector axis)
@@ -118,17 +108,15 @@ static void frame_of(alb_vector *x, alb_vector *y, alb_vector axis)
     *y = (alb_vector){-q, p, 0};
 }
 
-// out += weight sample, turned about z by the angle between the frame of `to` and that of `from` carried there.
+// out += weight sample, turned about z by the angle between the frame of `to` and that of `from`, laid flat there: for
+// 20 degrees between them that is within half a degree of carried along the great circle.
 static void add_along(float *out, const float *sample, int order, float weight, alb_vector from, alb_vector to)
 {
-    alb_vector x, y, carried;
-    frame_of(&x, &carried, from);
+    alb_vector x, y, flat;
+    frame_of(&x, &flat, from);
     frame_of(&x, &y, to);
-    const alb_vector turn = alb_cross(from, to); // y' = y cos + turn x y + turn (turn . y) / (1 + cos)
-    const double cosine = alb_dot(from, to);
-    carried = alb_add(alb_add(alb_times(cosine, carried), alb_cross(turn, carried)),
-                      alb_times(alb_dot(turn, carried) / (1 + cosine), turn));
-    const float c = (float)alb_dot(carried, y), s = (float)-alb_dot(carried, x);
+    const double across = alb_dot(flat, x), along = alb_dot(flat, y), length = hypot(across, along);
+    const float c = (float)(along / length), s = (float)(-across / length);
     float wc = weight, ws = 0;
     for (int m = 0; m < order; m++) {
         for (int l = m; l < order; l++) {
@@ -157,29 +145,19 @@ static void at_along(float *out, const alb_shadow_field *field, int shell, const
     }
 }
 
-float alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction)
+void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction)
 {
     const alb_shadow_shell *of = &field->shells[shell];
     const alb_shadow_place place = alb_shadow_grid_place((alb_shadow_grid){of->cells}, direction);
-    const size_t values = (size_t)field->channels * alb_shadow_shell_values(of);
     if (of->along) {
         at_along(out, field, shell, &place, direction);
-        return 1;
+        return;
     }
+    const size_t values = (size_t)field->channels * alb_shadow_shell_values(of);
     const float *from[4];
-    float weights[4], share = 1;
-    memcpy(weights, place.weights, sizeof weights);
-    if (shell < field->settings.inner) {
-        const bool *buried = field->buried + (size_t)shell * field->studio->nodes[shell].count;
-        for (int k = 0; k < 4; k++)
-            weights[k] *= buried[place.nodes[k]] ? 1e-3F : 1;
-        share = weights[0] + weights[1] + weights[2] + weights[3];
-        for (int k = 0; k < 4; k++)
-            weights[k] /= share;
-    }
     for (int k = 0; k < 4; k++)
         from[k] = alb_shadow_sample_at(field, shell, (size_t)place.nodes[k]);
     for (size_t i = 0; i < values; i++)
-        out[i] = weights[0] * from[0][i] + weights[1] * from[1][i] + weights[2] * from[2][i] + weights[3] * from[3][i];
-    return share;
+        out[i] = place.weights[0] * from[0][i] + place.weights[1] * from[1][i] + place.weights[2] * from[2][i] +
+                 place.weights[3] * from[3][i];
 }

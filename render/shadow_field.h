@@ -50,8 +50,7 @@ typedef struct alb_shadow_field {
     alb_shadow_shell shells[ALB_SHADOW_SHELLS_MAX]; // by radius, ascending
     float *samples;                                 // [shell][node][channel][order^2]
     size_t sample_count;                            // floats
-    bool *buried;    // [inner shell][node]: inside the object. Such nodes hold what the shell outside them gives,
-    size_t replaced; // scaled, and hardly count; how many there are
+    size_t moved;                     // inner nodes that lie inside the object: they see from just outside of it
     struct alb_shadow_studio *studio; // what pictures are taken with
 } alb_shadow_field;
 
@@ -67,5 +66,4 @@ size_t alb_shadow_field_bytes(const alb_shadow_field *field);
 
 // The samples of a shell interpolated at a direction from the middle: out[channel][order^2], order that of the shell,
 // in the world's frame; of a shell that is `along`, in the frame of the axis -direction (sh_rotate.h), and one channel.
-// The share of the nodes around that are not buried, at least a thousandth.
-float alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction);
+void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction);

@@ -1,12 +1,14 @@
 // From each outer node a flat picture (shadow_view.h) gives the coefficients in the picture's frame, which is that of
-// the axis to the middle; from each inner node rays to all sides (shadow_lattice.h). A node inside the object sees its
-// inner wall, which hides everything from the receivers around it: it is marked as buried and holds the sample of the
-// shell outside it, scaled (k < 1) as for a receiver there, in case all around a receiver are buried.
+// the axis to the middle; from each inner node rays to all sides (shadow_lattice.h). A node inside the object would see
+// its inner wall, which hides everything from the receivers around it. It sees from just behind the nearest wall, where
+// receivers between the surface and the nodes outside it are; where parts of an object overlap, behind the next one.
+// Stops being true for receivers on the other side of a part thinner than the distance of the nodes.
 #include "render/sh_rotate.h"
-#include "render/sh_scale.h"
 #include "render/shadow_studio.h"
 #include <omp.h>
 #include <string.h>
+
+enum { MOVES = 4 };
 
 // The picture from node n of a shell outside: its sample, or column n of local.
 static void take_picture(const alb_shadow_field *field, int shell, size_t n)
@@ -49,47 +51,21 @@ static void sample_outside(const alb_shadow_field *field, int shell)
     }
 }
 
-// What the shell outside gives at the node, scaled inwards.
-static void replace(float *out, const alb_shadow_field *field, int shell, size_t n, const alb_sh_scaling *scaling)
-{
-    const alb_shadow_nodes *of = &field->studio->nodes[shell];
-    const alb_shadow_shell *outside = &field->shells[shell + 1];
-    const float axis[3] = {of->axes[n], of->axes[of->count + n], of->axes[2 * of->count + n]};
-    float turned[ALB_SH_COUNT_MAX];
-    double sample[ALB_SH_COUNT_MAX], scaled[ALB_SH_COUNT_MAX];
-    alb_shadow_field_at(turned, field, shell + 1, of->directions[n]);
-    if (!outside->along)
-        alb_sh_to_axis_batch(turned, turned, outside->order, axis, 1, 1);
-    for (size_t i = 0; i < alb_shadow_shell_values(outside); i++)
-        sample[i] = (double)turned[i];
-    alb_sh_scaling_apply(scaled, scaling, sample);
-    for (size_t i = 0; i < alb_shadow_shell_values(&field->shells[shell]); i++)
-        turned[i] = (float)scaled[i];
-    alb_sh_from_axis_batch(out, turned, field->shells[shell].order, axis, 1, 1);
-}
-
-static bool sample_shell_inside(alb_shadow_field *field, int shell, const alb_tracer *tracer, alb_error *error)
+static void sample_shell_inside(alb_shadow_field *field, int shell, const alb_tracer *tracer)
 {
     const alb_shadow_studio *s = field->studio;
     const alb_shadow_nodes *of = &s->nodes[shell];
-    const alb_sh_law law = {ALB_SH_LAW_OCCLUSION, ALB_SH_MAP_CONE, 45, field->shells[shell].order,
-                            field->shells[shell + 1].order};
     const double away_mm = field->shells[shell].radius * field->sphere.radius_mm;
-    bool *buried = field->buried + (size_t)shell * of->count;
-    alb_sh_scaling scaling;
-    if (!alb_sh_law_at(&scaling, &law, field->shells[shell].radius / field->shells[shell + 1].radius, error))
-        return false;
-#pragma omp parallel for schedule(dynamic, 8)
+    size_t moved = 0;
+#pragma omp parallel for schedule(dynamic, 8) reduction(+ : moved)
     for (size_t n = 0; n < of->count; n++) {
-        const alb_vector at = alb_add(field->sphere.centre_mm, alb_times(away_mm, of->directions[n]));
-        float *out = alb_shadow_sample_at(field, shell, n);
-        buried[n] = !alb_shadow_lattice_look(out, &s->rays, tracer, at);
-        if (buried[n])
-            replace(out, field, shell, n, &scaling);
+        alb_vector at = alb_add(field->sphere.centre_mm, alb_times(away_mm, of->directions[n]));
+        int moves = 0;
+        while (!alb_shadow_lattice_look(alb_shadow_sample_at(field, shell, n), &at, &s->rays, tracer) && moves < MOVES)
+            moves++;
+        moved += moves > 0;
     }
-    for (size_t n = 0; n < of->count; n++)
-        field->replaced += buried[n];
-    return true;
+    field->moved += moved;
 }
 
 static bool sample_inside(alb_shadow_field *field, const alb_vector *vertices, alb_error *error)
@@ -100,10 +76,10 @@ static bool sample_inside(alb_shadow_field *field, const alb_vector *vertices, a
                            .faces = s->shape.faces,
                            .face_count = s->shape.face_count};
     alb_tracer tracer;
-    bool ok = alb_tracer_create(&tracer, &mesh, error);
-    field->replaced = 0;
-    for (int shell = field->settings.inner - 1; ok && shell >= 0; shell--)
-        ok = sample_shell_inside(field, shell, &tracer, error);
+    const bool ok = alb_tracer_create(&tracer, &mesh, error);
+    field->moved = 0;
+    for (int shell = 0; shell < (ok ? field->settings.inner : 0); shell++)
+        sample_shell_inside(field, shell, &tracer);
     alb_tracer_free(&tracer);
     return ok;
 }

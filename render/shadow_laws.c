@@ -2,9 +2,9 @@
 #include "render/shadow_field.h"
 
 enum { CELLS = 256, LAWS = 6 };
-// From 2.9 radii silhouettes lie nearer the middle than those of the printed 45 degrees: measured,
-// render/shadow_field.c for k from 1 to 3, best of 45, 52, 60, 75 on eight objects.
-static const double far_alpha_deg = 55;
+// Of the far shell's cone: objects that fill their spheres have silhouettes nearer the middle than the printed 45
+// degrees put them. Best of 45 to 75 on eight objects from 2.7 to 8 radii; nearer by 45 is better.
+static const double far_alpha_deg = 53;
 
 bool alb_shadow_laws_create(alb_shadow_laws *laws, int order, bool paper, alb_error *error)
 {

@@ -48,17 +48,16 @@ bool alb_shadow_receivers_weigh(alb_shadow_receivers *receivers, const alb_shado
     return any;
 }
 
-// out += weight M(k) sample, in the frame of the axis; sum += weight.
-static void add_scaled(float *out, float *sum, const alb_shadow_receivers *receivers, const alb_shadow_field *field,
-                       int shell, const alb_sh_batch *law)
+// out += weight M(k) sample, in the frame of the axis.
+static void add_scaled(float *out, const alb_shadow_receivers *receivers, const alb_shadow_field *field, int shell,
+                       const alb_sh_batch *law)
 {
     const alb_shadow_shell *of = &field->shells[shell];
     const size_t values = (size_t)(of->order * of->order), count = receivers->count;
-    float samples[ALB_SH_COUNT_MAX * BLOCK], scaled[VALUES * BLOCK], one[ALB_SH_COUNT_MAX], weights[BLOCK];
+    float samples[ALB_SH_COUNT_MAX * BLOCK], scaled[VALUES * BLOCK], one[ALB_SH_COUNT_MAX];
     memset(samples, 0, values * BLOCK * sizeof *samples);
     for (size_t r = 0; r < count; r++) {
-        weights[r] = receivers->weights[r] * alb_shadow_field_at(one, field, shell, receivers->directions[r]);
-        sum[r] += weights[r];
+        alb_shadow_field_at(one, field, shell, receivers->directions[r]);
         for (size_t i = 0; i < values; i++)
             samples[i * BLOCK + r] = one[i];
     }
@@ -67,7 +66,7 @@ static void add_scaled(float *out, float *sum, const alb_shadow_receivers *recei
     alb_sh_batch_apply(scaled, law, false, receivers->k, samples, BLOCK, count);
     for (size_t i = 0; i < VALUES; i++)
         for (size_t r = 0; r < count; r++)
-            out[i * BLOCK + r] += weights[r] * scaled[i * BLOCK + r];
+            out[i * BLOCK + r] += receivers->weights[r] * scaled[i * BLOCK + r];
 }
 
 static const alb_sh_batch *law_of(const alb_shadow_laws *laws, const alb_shadow_field *field, int shell)
@@ -81,13 +80,9 @@ static const alb_sh_batch *law_of(const alb_shadow_laws *laws, const alb_shadow_
 void alb_shadow_receivers_occlusion(float *out, alb_shadow_receivers *receivers, const alb_shadow_field *field,
                                     const alb_shadow_laws *laws)
 {
-    float sum[BLOCK] = {0};
     memset(out, 0, VALUES * BLOCK * sizeof *out);
     for (int shell = 0; shell < field->shell_count; shell++)
         if (alb_shadow_receivers_weigh(receivers, field, shell))
-            add_scaled(out, sum, receivers, field, shell, law_of(laws, field, shell));
-    for (size_t i = 0; i < VALUES; i++)
-        for (size_t r = 0; r < receivers->count; r++)
-            out[i * BLOCK + r] /= sum[r];
+            add_scaled(out, receivers, field, shell, law_of(laws, field, shell));
     alb_sh_from_axis_batch(out, out, ALB_SHADOW_ORDER, receivers->axes, BLOCK, receivers->count);
 }
