@@ -58,7 +58,7 @@ static void note_row(alb_form_factors *factors, const uint32_t *hits, size_t pat
 static bool allocate(alb_form_factors *factors, const uint32_t *lengths, alb_error *error)
 {
     const size_t n = factors->patch_count;
-    return alb_hit_rows_create(&factors->rows, lengths, n, n + 2, factors->memory_bytes, error) &&
+    return alb_hit_rows_create(&factors->rows, lengths, n, n + 2, (uint32_t)n, factors->memory_bytes, error) &&
            (factors->sky_shares = alb_allocate(n, sizeof(float), error)) &&
            (factors->back_shares = alb_allocate(n, sizeof(float), error)) &&
            (factors->gathered = alb_allocate(n + 2, sizeof *factors->gathered, error)) &&
@@ -110,6 +110,7 @@ static bool fill(alb_form_factors *factors, const source *from, alb_error *error
     }
     alb_progress_end(&progress);
     free(hits);
+    alb_hit_rows_trim(&factors->rows);
     if (!factors->sky_rays) {
         free(factors->sky_mask);
         factors->sky_mask = NULL;

@@ -10,6 +10,7 @@
 #include "base/vector_clones.h"
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -65,9 +66,10 @@ static bool map_file(alb_hit_rows *rows, size_t bytes, alb_error *error)
 }
 
 bool alb_hit_rows_create(alb_hit_rows *rows, const uint32_t *lengths, size_t count, size_t index_count,
-                         size_t memory_bytes, alb_error *error)
+                         uint32_t counted, size_t memory_bytes, alb_error *error)
 {
     *rows = (alb_hit_rows){.count = count,
+                           .counted = counted,
                            .chunks = (count + ALB_CHUNK_ROWS - 1) / ALB_CHUNK_ROWS,
                            .blocks = (index_count + ALB_BLOCK_MAX - 1) / ALB_BLOCK_MAX};
     rows->block_size = (index_count + rows->blocks - 1) / rows->blocks;
@@ -170,27 +172,75 @@ void alb_hit_rows_fill(alb_hit_rows *rows, size_t chunk, uint32_t *hits, uint32_
         for (size_t r = 0; r < n; r++)
             for (int half = 0; half < 2; half++) {
                 const uint32_t *at = places[r][half];
-                while (at < ends[r][half] && *at < from + rows->block_size)
-                    *out++ = (uint16_t)(*at++ - from);
-                counts[r][half] = (uint16_t)(at - places[r][half]);
+                const uint16_t *const kept = out;
+                for (; at < ends[r][half] && *at < from + rows->block_size; at++)
+                    if (*at != rows->counted)
+                        *out++ = (uint16_t)(*at - from);
+                counts[r][half] = (uint16_t)(out - kept);
                 places[r][half] = at;
             }
     }
+}
+
+static size_t kept_in(const alb_hit_rows *rows, size_t chunk)
+{
+    size_t kept = 0;
+    const uint16_t *counts = rows->counts + 2 * ALB_CHUNK_ROWS * rows->blocks * chunk;
+    for (size_t i = 0; i < 2 * ALB_CHUNK_ROWS * rows->blocks; i++)
+        kept += counts[i];
+    return kept;
+}
+
+void alb_hit_rows_trim(alb_hit_rows *rows)
+{
+    size_t kept = 0;
+    if (rows->mapped_bytes || rows->counted == UINT32_MAX)
+        return;
+    for (size_t chunk = 0; chunk < rows->chunks; chunk++) {
+        size_t *segments = rows->segments + chunk * rows->blocks;
+        const size_t count = kept_in(rows, chunk), from = segments[0];
+        memmove(rows->hits + kept, rows->hits + from, count * sizeof *rows->hits);
+        for (size_t block = 0; block < rows->blocks; block++)
+            segments[block] -= from - kept;
+        kept += count;
+    }
+    uint16_t *smaller = realloc(rows->hits, (kept ? kept : 1) * sizeof *rows->hits);
+    if (smaller) {
+        rows->hits = smaller;
+        rows->segments[rows->chunks * rows->blocks] = kept;
+    }
+}
+
+// Hits of the row's half that are counted alone.
+static size_t missing(const alb_hit_rows *rows, size_t row, int half)
+{
+    size_t left = half_of(rows->first[row + 1] - rows->first[row], half);
+    for (size_t block = 0; block < rows->blocks; block++)
+        left -= counts_of(rows, row / ALB_CHUNK_ROWS, block)[row % ALB_CHUNK_ROWS][half];
+    return left;
 }
 
 void alb_hit_rows_read(uint32_t *hits, const alb_hit_rows *rows, size_t row)
 {
     const size_t chunk = row / ALB_CHUNK_ROWS, within = row % ALB_CHUNK_ROWS;
     uint32_t *out[2] = {hits, hits + half_of(rows->first[row + 1] - rows->first[row], 0)};
+    size_t left[2] = {missing(rows, row, 0), missing(rows, row, 1)};
     for (size_t block = 0; block < rows->blocks; block++) {
         const uint16_t(*counts)[2] = (const uint16_t(*)[2])counts_of(rows, chunk, block);
         const uint16_t *at = rows->hits + rows->segments[chunk * rows->blocks + block];
         for (size_t r = 0; r < within; r++)
             at += (size_t)counts[r][0] + counts[r][1];
         for (int half = 0; half < 2; half++)
-            for (unsigned k = 0; k < counts[within][half]; k++)
-                *out[half]++ = (uint32_t)(block * rows->block_size + *at++);
+            for (unsigned k = 0; k < counts[within][half]; k++) {
+                const uint32_t hit = (uint32_t)(block * rows->block_size + *at++);
+                for (; left[half] && rows->counted < hit; left[half]--)
+                    *out[half]++ = rows->counted;
+                *out[half]++ = hit;
+            }
     }
+    for (int half = 0; half < 2; half++)
+        for (; left[half]; left[half]--)
+            *out[half]++ = rows->counted;
 }
 
 // --- products --------------------------------------------------------------------------------------------------------
@@ -262,9 +312,22 @@ static void gather_part(const product *p, size_t chunk, size_t block)
         gather(p, chunk, block);
 }
 
+// What comes from the index whose hits are counted: nothing, mostly.
 static void start_rows(const product *p, size_t chunk)
 {
-    memset(p->out + chunk * ALB_CHUNK_ROWS, 0, rows_of(p->rows, chunk) * sizeof *p->out);
+    const alb_hit_rows *rows = p->rows;
+    const size_t begin = chunk * ALB_CHUNK_ROWS, end = begin + rows_of(rows, chunk);
+    memset(p->out + begin, 0, (end - begin) * sizeof *p->out);
+    if (rows->counted == UINT32_MAX)
+        return;
+    const float4 value = p->values[rows->counted];
+    for (size_t r = begin; r < end && (value[0] != 0 || value[1] != 0 || value[2] != 0); r++)
+        for (int half = 0; half < 2; half++) {
+            const double length = (double)half_of(rows->first[r + 1] - rows->first[r], half),
+                         weight = !p->difference ? 1 : (half ? -0.5 : 0.5) / fmax(length, 1);
+            for (int c = 0; c < 3; c++)
+                p->out[r][c] += weight * (double)missing(rows, r, half) * (double)value[c];
+        }
 }
 
 static void finish_rows(const product *p, size_t chunk)

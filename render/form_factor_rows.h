@@ -3,7 +3,8 @@
 // Row p has first[p + 1] - first[p] hits, its even rays and its odd ones apart, each half ascending. Indices are cut in
 // even blocks of at most 65,536 and stored as the 16 bits within their block. Rows go in chunks of ALB_CHUNK_ROWS; a
 // chunk holds for each block the hits of all its rows, so that a product can stay in one block's radiosity (1 MiB at
-// most: a core's cache) over all rows.
+// most: a core's cache) over all rows. Hits of one index, the sky's in a scene that is open, are what is missing from a
+// row's length: they are counted and not kept.
 #pragma once
 #include "base/error.h"
 #include <stddef.h>
@@ -13,17 +14,19 @@ enum { ALB_CHUNK_ROWS = 256, ALB_BLOCK_MAX = 1 << 16 };
 
 typedef struct alb_hit_rows {
     size_t count, chunks, blocks, block_size;
-    size_t *first;    // [count + 1]
-    size_t *segments; // [chunk * blocks + block]: where in hits the block's part begins; one more at the end
+    uint32_t counted; // the index whose hits are not kept
+    size_t *first;    // [count + 1]: rows of lengths first[p + 1] - first[p]
+    size_t *segments; // [chunk * blocks + block]: where in hits the block's part begins; at the end: room for hits
     uint16_t *counts; // [((chunk * blocks + block) * ALB_CHUNK_ROWS + row in chunk) * 2 + half]
     uint16_t *hits;
     size_t mapped_bytes; // of hits, where they lie in a file; 0: in memory
 } alb_hit_rows;
 
-// Rows of lengths[p] (1..65,536) hits to indices below index_count, to be filled chunk by chunk. Hits of more than
-// memory_bytes (0: no limit) go to an unlinked temporary file in TMPDIR or /var/tmp.
+// Rows of lengths[p] (1..65,536) hits to indices below index_count, to be filled chunk by chunk; counted: the index
+// whose hits are not kept, UINT32_MAX for none. If hits may take more than memory_bytes (0: no limit) they go to an
+// unlinked temporary file in TMPDIR or /var/tmp.
 bool alb_hit_rows_create(alb_hit_rows *rows, const uint32_t *lengths, size_t count, size_t index_count,
-                         size_t memory_bytes, alb_error *error);
+                         uint32_t counted, size_t memory_bytes, alb_error *error);
 void alb_hit_rows_free(alb_hit_rows *rows);
 size_t alb_hit_rows_bytes(const alb_hit_rows *rows);
 // Hits of the largest chunk: room for the arguments of fill.
@@ -31,6 +34,8 @@ size_t alb_hit_rows_largest_chunk(const alb_hit_rows *rows);
 // Fills a chunk from the hits of its rows one after the other, in ray order; they end up sorted. `scratch` has room for
 // one row. Chunks may be filled by different threads.
 void alb_hit_rows_fill(alb_hit_rows *rows, size_t chunk, uint32_t *hits, uint32_t *scratch);
+// Gives back the room that the filled rows do not need.
+void alb_hit_rows_trim(alb_hit_rows *rows);
 // The hits of one row: even rays ascending, then odd rays ascending.
 void alb_hit_rows_read(uint32_t *hits, const alb_hit_rows *rows, size_t row);
 // out[row] = mean over the row's hits of values[hit]; difference: half the mean over its even rays minus half the mean

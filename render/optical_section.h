@@ -25,3 +25,8 @@ int alb_section_follow(alb_cut *cuts, int *cut_count, int curve, const alb_surfa
                        const alb_section_plane *plane, const alb_chord *chord, size_t first, double most_mm);
 // The string from (0, 0) over the cuts to (length, 0): those it touches, in place; how many.
 int alb_section_tighten(alb_cut *cuts, int count, double length);
+// The path from end to end of the chord over the cuts that the string touches, its corners moved in space to where it
+// is shortest or near that. False where it leaves the body; that is not looked into where it is not shorter than
+// most_mm.
+bool alb_string(alb_bends *bends, const alb_cut *hull, int kept, const alb_optical_solid *solid, const alb_chord *chord,
+                const alb_section_plane *plane, double most_mm);

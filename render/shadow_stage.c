@@ -35,25 +35,34 @@ static bool cut_out(alb_mesh *mesh, float (**radiance)[3], const alb_scene *scen
     return ok;
 }
 
-static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o, bool light, alb_error *error)
+// Of a light's field samples make no use but of its sphere.
+static const alb_shadow_settings sphere_alone = {.order = 2, .cells = 1, .pixels = 8, .distance = 1.1, .outer = 1};
+
+// Lights with a surface look along lines of sight: the finer the samples the better.
+static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o, bool light, bool fine,
+                      alb_error *error)
 {
     const size_t index = stage->occluder_count + stage->light_count;
     alb_shadow_settings settings = stage->settings;
     alb_mesh mesh = {0};
     float(*radiance)[3] = NULL;
     if (light)
-        settings = alb_shadow_light_settings;
+        settings = stage->paper ? alb_shadow_light_settings : sphere_alone;
+    else if (fine)
+        settings.order = ALB_SH_ORDER_MAX;
     stage->objects[index] = o;
     stage->first_vertices[index] = scene->objects[o].first_vertex;
     snprintf(stage->names[index], sizeof *stage->names, "object %zu", o);
     stage->of_body[index] = scene->objects[o].rigid && !light;
-    const bool ok =
+    bool ok =
         cut_out(&mesh, &radiance, scene, &scene->objects[o], error) &&
         alb_shadow_field_create(&stage->fields[index], &settings, &mesh, light ? (const float(*)[3])radiance : NULL,
                                 stage->names[index], error) &&
         (light || !settings.probes ||
          alb_shadow_surface_create(&stage->surfaces[index], &mesh, stage->normals + scene->objects[o].first_vertex,
                                    (size_t)settings.probes, error));
+    if (ok && light && !stage->paper)
+        ok = alb_shadow_emitter_create(&stage->emitters[stage->light_count], &mesh, (const float(*)[3])radiance, error);
     if (!ok)
         alb_shadow_field_free(&stage->fields[index]);
     *(light ? &stage->light_count : &stage->occluder_count) += ok;
@@ -76,6 +85,9 @@ static void free_fields(alb_shadow_stage *stage)
 {
     for (size_t i = 0; stage->fields && i < stage->occluder_count + stage->light_count; i++)
         alb_shadow_field_free(&stage->fields[i]);
+    for (size_t i = 0; stage->emitters && i < stage->light_count; i++)
+        alb_shadow_emitter_free(&stage->emitters[i]);
+    free(stage->emitters);
     free(stage->fields);
     free(stage->objects);
     free(stage->names);
@@ -147,10 +159,11 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
 {
     const alb_mesh *mesh = &scene->mesh;
     const size_t n = scene->object_count;
-    bool *shines = NULL;
+    bool *shines = NULL, any = false;
     bool ok = (stage->fields = alb_allocate(n, sizeof *stage->fields, error)) &&
               (stage->objects = alb_allocate(n, sizeof *stage->objects, error)) &&
               (stage->names = alb_allocate(n, sizeof *stage->names, error)) &&
+              (stage->paper || (stage->emitters = alb_allocate(n, sizeof *stage->emitters, error))) &&
               (stage->of_body = alb_allocate(n, sizeof *stage->of_body, error)) &&
               (stage->surfaces = alb_allocate(n, sizeof *stage->surfaces, error)) &&
               (stage->first_vertices = alb_allocate(n, sizeof *stage->first_vertices, error)) &&
@@ -161,10 +174,12 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
               find_lights(&shines, scene, error);
     if (ok)
         set_normals(stage->normals, mesh);
+    for (size_t o = 0; ok && o < n; o++)
+        any |= shines[o];
     for (int light = 0; light < 2; light++) // occluders first
         for (size_t o = 0; ok && o < n; o++)
             if (shines[o] == (light == 1) && (light || !scene->objects[o].receives_only))
-                ok = add_field(stage, scene, o, light, error);
+                ok = add_field(stage, scene, o, light, any && !stage->paper, error);
     ok = ok && create_transport(stage, scene, shines, error);
     free(shines);
     if (!ok)
@@ -173,13 +188,14 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
     memcpy(stage->groups, mesh->groups, mesh->face_count * sizeof *stage->groups);
     stage->face_count = mesh->face_count;
     stage->vertex_count = mesh->vertex_count;
-    if (stage->laws_order == stage->settings.order)
+    const int order = stage->occluder_count ? stage->fields[0].settings.order : stage->settings.order;
+    if (stage->laws_order == order)
         return true;
     alb_shadow_laws_free(&stage->laws);
     stage->laws_order = 0;
-    if (!alb_shadow_laws_create(&stage->laws, stage->settings.order, stage->paper, error))
+    if (!alb_shadow_laws_create(&stage->laws, order, stage->paper, error))
         return false;
-    stage->laws_order = stage->settings.order;
+    stage->laws_order = order;
     return true;
 }
 
@@ -215,6 +231,7 @@ alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage)
                               .occluder_count = stage->occluder_count,
                               .lights = stage->fields + stage->occluder_count,
                               .light_count = stage->light_count,
+                              .emitters = stage->emitters,
                               .skies = stage->skies,
                               .sky_count = stage->sky_count,
                               .laws = &stage->laws,
@@ -247,6 +264,11 @@ bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb
         if (stage->light_count || !stage->of_body[i]) // skies have the transport of what is rigid
             ok = alb_shadow_surface_sample(&stage->surfaces[i], mesh->vertices + stage->first_vertices[i],
                                            stage->normals + stage->first_vertices[i], error);
+    for (size_t i = 0; ok && stage->emitters && i < stage->light_count; i++) {
+        const size_t light = stage->occluder_count + i;
+        ok = alb_shadow_emitter_place(&stage->emitters[i], mesh->vertices + stage->first_vertices[light],
+                                      &stage->fields[light].sphere, error);
+    }
     const double sampled_s = alb_clock_s();
     if (ok) {
         const alb_shadow_world world = alb_shadow_stage_world(stage);

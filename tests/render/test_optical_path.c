@@ -152,6 +152,32 @@ static void ring_follows_its_closed_form(void **state)
     world_free(&w);
 }
 
+// From side to side of a hole and up or down as well, paths are helices, in no plane; where the ends lie opposite, the
+// surface does not say which way round either.
+static void paths_wind_around_a_hole(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    double mean = 0, largest = 0;
+    int count = 0;
+    world w = {0};
+    check_ok(make_ring(&w.mesh, 0.5, 1, 0.6, 128, 10, 12, &error), &error);
+    world_create(&w, (alb_optical_options){.voxel_mm = 0.12});
+    for (uint64_t i = 0; count < 400; i++) {
+        const uint32_t from = random_patch(&w, 2 * i), to = random_patch(&w, 2 * i + 1);
+        const alb_vector a = w.patches.centroids[from], b = w.patches.centroids[to];
+        const double p[2] = {a.x, a.y}, q[2] = {b.x, b.y};
+        if (hypot(a.x, a.y) > 0.501 || hypot(b.x, b.y) > 0.501 || a.x * b.x + a.y * b.y > -0.2 || fabs(a.z - b.z) < 0.3)
+            continue;
+        const double error_here = fabs(measure(&w, from, to) / hypot(ring_distance(0.5, p, q), a.z - b.z) - 1);
+        mean += error_here, largest = fmax(largest, error_here);
+        count++;
+    }
+    check_below(mean / count, 0.0003); // 128 facets lie up to 0.03 % inside the circle
+    check_below(largest, 0.001);
+    world_free(&w);
+}
+
 static void prisms_follow_their_unfolding(void **state)
 {
     (void)state;
@@ -503,6 +529,7 @@ int main(void)
         cmocka_unit_test(convex_is_straight),
         cmocka_unit_test(chords_of_a_sphere_stay_inside),
         cmocka_unit_test(ring_follows_its_closed_form),
+        cmocka_unit_test(paths_wind_around_a_hole),
         cmocka_unit_test(prisms_follow_their_unfolding),
         cmocka_unit_test(coarse_voxels_are_as_good),
         cmocka_unit_test(no_segment_slips_through_a_corner),
