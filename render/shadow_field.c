@@ -1,6 +1,6 @@
 // Between nodes samples are interpolated bilinearly. In the world's frame that blurs an object by the angle between two
-// nodes as seen from its middle; a shell that is `along` first turns each node's sample with the rotation that takes
-// the node to the receiver along a great circle, and blurs only the parallax of the object's depth. In the frames of
+// nodes as seen from its middle; the far shell first turns each node's sample with the rotation that takes the node to
+// the receiver along a great circle, and blurs only the parallax of the object's depth. In the frames of
 // the two axes that rotation is a turn about z alone, by the angle between them: it varies without a seam, though
 // frames have one at their poles.
 //
@@ -45,19 +45,16 @@ static bool check(const alb_shadow_settings *s, bool shines, const char *name, a
            alb_fail(error, ALB_BAD_DATA, "%s: a light's field has no inner and no far shells", name);
 }
 
-// Samples that turn along take fewer nodes and more bands.
+// The nodes of shells inside are nearer to each other: fewer do. The far shell takes few nodes and many bands.
 static alb_shadow_shell shell_of(const alb_shadow_settings *s, int index)
 {
-    const int outer = index - s->inner, cells[2] = {(5 * s->cells + 7) / 8, (s->cells + 1) / 2};
-    if (outer < 0)
-        return (alb_shadow_shell){
-            .radius = inner_radii[s->inner - 1][-1 - outer], .order = s->order, .cells = s->cells};
+    const int outer = index - s->inner;
     if (outer == s->outer)
-        return (alb_shadow_shell){.radius = far_radius, .order = ALB_SH_ORDER_MAX, .cells = cells[1], .along = true};
-    return (alb_shadow_shell){.radius = s->distance * outer_ratios[outer],
-                              .order = s->far && s->order < 6 ? 6 : s->order,
-                              .cells = s->far ? cells[0] : s->cells,
-                              .along = s->far};
+        return (alb_shadow_shell){
+            .radius = far_radius, .order = ALB_SH_ORDER_MAX, .cells = (s->cells + 1) / 2, .turns = true};
+    const double radius = outer < 0 ? inner_radii[s->inner - 1][-1 - outer] : s->distance * outer_ratios[outer];
+    const int cells = radius < 1 ? (int)ceil((0.5 + 0.5 * radius) * s->cells) : s->cells;
+    return (alb_shadow_shell){.radius = radius, .order = s->order, .cells = cells};
 }
 
 static void place_shells(alb_shadow_field *field)
@@ -110,7 +107,7 @@ static void frame_of(alb_vector *x, alb_vector *y, alb_vector axis)
 
 // out += weight sample, turned about z by the angle between the frame of `to` and that of `from`, laid flat there: for
 // 20 degrees between them that is within half a degree of carried along the great circle.
-static void add_along(float *out, const float *sample, int order, float weight, alb_vector from, alb_vector to)
+static void add_turned(float *out, const float *sample, int order, float weight, alb_vector from, alb_vector to)
 {
     alb_vector x, y, flat;
     frame_of(&x, &flat, from);
@@ -132,16 +129,16 @@ static void add_along(float *out, const float *sample, int order, float weight, 
     }
 }
 
-static void at_along(float *out, const alb_shadow_field *field, int shell, const alb_shadow_place *place,
-                     alb_vector direction)
+static void at_turned(float *out, const alb_shadow_field *field, int shell, const alb_shadow_place *place,
+                      alb_vector direction)
 {
     const alb_shadow_shell *of = &field->shells[shell];
     const alb_vector *nodes = field->studio->nodes[shell].directions, axis = alb_times(-1, alb_unit(direction));
     memset(out, 0, alb_shadow_shell_values(of) * sizeof *out);
     for (int k = 0; k < 4; k++) {
         const size_t n = (size_t)place->nodes[k];
-        add_along(out, alb_shadow_sample_at(field, shell, n), of->order, place->weights[k], alb_times(-1, nodes[n]),
-                  axis);
+        add_turned(out, alb_shadow_sample_at(field, shell, n), of->order, place->weights[k], alb_times(-1, nodes[n]),
+                   axis);
     }
 }
 
@@ -149,8 +146,8 @@ void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, a
 {
     const alb_shadow_shell *of = &field->shells[shell];
     const alb_shadow_place place = alb_shadow_grid_place((alb_shadow_grid){of->cells}, direction);
-    if (of->along) {
-        at_along(out, field, shell, &place, direction);
+    if (of->turns) {
+        at_turned(out, field, shell, &place, direction);
         return;
     }
     const size_t values = (size_t)field->channels * alb_shadow_shell_values(of);

@@ -25,8 +25,7 @@ typedef struct alb_shadow_settings {
     int outer;       // shells outside, 1 to ALB_SHADOW_OUTER_MAX
     int inner;       // shells inside, 0 to ALB_SHADOW_INNER_MAX; occlusion only
     bool far;        // one more at 2.9 radii, beyond the others, of order 8 on half the cells: from afar finer bands
-                     // matter more than nodes do. The others outside then are of order 6 at least, on 5/8 of the cells;
-                     // occlusion only
+                     // matter more than nodes do; occlusion only
     int rays;        // from each inner node
     int probes;      // on the object's own surface (shadow_surface.h), 0 to ALB_SHADOW_PROBES_MAX; occlusion only
     double cluster;  // vertices within about so many radii move as one in pictures from outside; 0: each for itself
@@ -38,7 +37,7 @@ extern const alb_shadow_settings alb_shadow_light_settings;
 typedef struct alb_shadow_shell {
     double radius; // in radii of the bounding sphere
     int order, cells;
-    bool along;   // samples are in the frames of their nodes' axes to the middle and turn along with a receiver's
+    bool turns;   // the far one: samples are in the frames of their nodes' axes and turn with the receiver's
     size_t first; // of its samples among all
 } alb_shadow_shell;
 
@@ -65,5 +64,5 @@ bool alb_shadow_field_sample(alb_shadow_field *field, const alb_vector *vertices
 size_t alb_shadow_field_bytes(const alb_shadow_field *field);
 
 // The samples of a shell interpolated at a direction from the middle: out[channel][order^2], order that of the shell,
-// in the world's frame; of a shell that is `along`, in the frame of the axis -direction (sh_rotate.h), and one channel.
+// in the world's frame; of one that turns in the frame of the axis -direction (sh_rotate.h), and one channel.
 void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction);

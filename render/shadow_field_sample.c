@@ -28,9 +28,9 @@ static void take_picture(const alb_shadow_field *field, int shell, size_t n)
         alb_shadow_view_occlusion(out, &w->corners, (const uint32_t(*)[3])s->shape.drawn, s->shape.drawn_count,
                                   s->shape.closed, lens);
     const size_t values = (size_t)(field->channels * lens->values);
-    if (field->shells[shell].along)
+    if (field->shells[shell].turns)
         memcpy(alb_shadow_sample_at(field, shell, n), out, values * sizeof *out);
-    for (size_t i = 0; !field->shells[shell].along && i < values; i++)
+    for (size_t i = 0; !field->shells[shell].turns && i < values; i++)
         s->local[i * of->count + n] = out[i];
 }
 
@@ -42,7 +42,7 @@ static void sample_outside(const alb_shadow_field *field, int shell)
 #pragma omp parallel for schedule(dynamic, 8) num_threads(s->work_count)
     for (size_t n = 0; n < count; n++)
         take_picture(field, shell, n);
-    for (size_t c = 0; !field->shells[shell].along && c < (size_t)field->channels; c++) {
+    for (size_t c = 0; !field->shells[shell].turns && c < (size_t)field->channels; c++) {
         float *local = s->local + c * values * count;
         alb_sh_from_axis_batch(local, local, field->shells[shell].order, of->axes, count, count);
         for (size_t n = 0; n < count; n++)

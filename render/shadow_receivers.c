@@ -61,7 +61,7 @@ static void add_scaled(float *out, const alb_shadow_receivers *receivers, const 
         for (size_t i = 0; i < values; i++)
             samples[i * BLOCK + r] = one[i];
     }
-    if (!of->along)
+    if (!of->turns)
         alb_sh_to_axis_batch(samples, samples, of->order, receivers->axes, BLOCK, count);
     alb_sh_batch_apply(scaled, law, false, receivers->k, samples, BLOCK, count);
     for (size_t i = 0; i < VALUES; i++)
@@ -74,7 +74,7 @@ static const alb_sh_batch *law_of(const alb_shadow_laws *laws, const alb_shadow_
     const int outer = shell - field->settings.inner;
     if (outer < 0)
         return &laws->inner;
-    return outer == field->settings.outer ? &laws->far : field->shells[shell].along ? &laws->along : &laws->outer;
+    return outer == field->settings.outer ? &laws->far : &laws->outer;
 }
 
 void alb_shadow_receivers_occlusion(float *out, alb_shadow_receivers *receivers, const alb_shadow_field *field,
