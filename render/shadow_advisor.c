@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "base/random.h"
+#include "render/shadow_cut.h"
 #include "render/shadow_rays.h"
 #include <stdlib.h>
 
@@ -23,20 +24,10 @@ typedef struct samples {
 static bool collect(alb_mesh *mesh, float (**radiance)[3], const alb_shadow_stage *stage, const alb_scene *scene,
                     alb_error *error)
 {
-    const alb_mesh *all = &scene->mesh;
-    bool ok = (*radiance = alb_allocate(all->face_count, sizeof **radiance, error)) != NULL;
-    for (size_t v = 0; ok && v < all->vertex_count; v++)
-        ok = alb_mesh_add_vertex(mesh, all->vertices[v], error);
-    for (size_t f = 0; ok && f < all->face_count; f++) {
-        bool used = false;
-        for (size_t i = 0; i < stage->occluder_count + stage->light_count && !used; i++)
-            used = alb_object_owns(&scene->objects[stage->objects[i]], all->faces[f][0]);
-        const size_t count = mesh->face_count;
-        ok = !used || alb_mesh_add_face(mesh, all->faces[f][0], all->faces[f][1], all->faces[f][2], 0, error);
-        for (int c = 0; c < 3 && mesh->face_count > count; c++)
-            (*radiance)[count][c] = (float)(scene->surfaces[all->groups[f]].exitance[c] / M_PI);
-    }
-    return ok;
+    bool chosen[ALB_OBJECTS_MAX] = {false};
+    for (size_t i = 0; i < stage->occluder_count + stage->light_count; i++)
+        chosen[stage->objects[i]] = true;
+    return alb_shadow_cut(mesh, radiance, scene, chosen, error);
 }
 
 static bool emits(const alb_shadow_stage *stage, const alb_scene *scene, size_t vertex)

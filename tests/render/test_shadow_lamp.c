@@ -264,7 +264,7 @@ static void light_inside_the_occluders_sphere(void **state)
     make_sheet(&mesh, (alb_vector){0, 0, 10}, 12);
     stage *s = new_stage(&mesh, NULL);
     irradiance(open, s, here, up);
-    add_ball(s, (alb_vector){0, 0, 14}, 2); // within the light's sphere, behind
+    add_ball(s, (alb_vector){0, 0, 16}, 5.5); // within the light's sphere, behind
     irradiance(found, s, here, up);
     check_relative((double)found[0], (double)open[0], 1e-6);
     add_ball(s, (alb_vector){0, 0, 5}, 2); // within it, before
