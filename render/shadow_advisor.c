@@ -18,6 +18,7 @@ enum { VERTICES = 400, STRATA = 12 };
 typedef struct samples {
     alb_vector points[VERTICES], normals[VERTICES];
     float found[VERTICES][3], halves[2][VERTICES][3];
+    int rays; // of a half
 } samples;
 
 // The faces of all that casts or emits, and what they send.
@@ -87,13 +88,14 @@ static void compare(alb_shadow_verdict *verdict, const samples *s)
             continue;
         if (!(percent <= worst)) {
             worst = percent;
-            verdict->rays = STRATA * STRATA * pow(random / fmax(square, 1e-6 * mean * mean), 0.75);
+            verdict->rays = pow(random / fmax(square, 1e-6 * mean * mean), 0.75);
         }
         upper = fmax(100 * sqrt(fmax(square + 3 * spread, 0)) / mean, isnan(upper) ? 0 : upper);
     }
     verdict->percent = worst;
     verdict->upper_percent = upper;
-    verdict->rays_s *= verdict->rays / (STRATA * STRATA);
+    verdict->rays_s *= verdict->rays;
+    verdict->rays *= s->rays;
 }
 
 bool alb_shadow_error(alb_shadow_verdict *verdict, const alb_shadow_stage *stage, const alb_scene *scene, uint64_t seed,
@@ -101,19 +103,23 @@ bool alb_shadow_error(alb_shadow_verdict *verdict, const alb_shadow_stage *stage
 {
     alb_mesh mesh = {0};
     alb_tracer tracer = {0};
+    alb_shadow_lamps lamps = {0};
     float(*radiance)[3] = NULL;
     samples *s = alb_allocate(1, sizeof *s, error);
     *verdict = (alb_shadow_verdict){NAN, NAN, NAN, NAN};
-    const bool ok = s && collect(&mesh, &radiance, stage, scene, error) && alb_tracer_create(&tracer, &mesh, error);
+    const bool ok = s && collect(&mesh, &radiance, stage, scene, error) && alb_tracer_create(&tracer, &mesh, error) &&
+                    alb_shadow_lamps_create(&lamps, &mesh, (const float(*)[3])radiance, error);
     const double offset_mm = 256 * tracer.slack_mm;
     if (ok && draw(s, &tracer, stage, scene, offset_mm, seed)) {
         const double start_s = alb_clock_s();
         for (int half = 0; half < 2; half++)
-            alb_shadow_cast(s->halves[half], &tracer, (const float(*)[3])radiance, scene->lights, scene->light_count,
-                            s->points, s->normals, VERTICES, STRATA, offset_mm, seed + (uint64_t)half);
+            alb_shadow_cast_aimed(s->halves[half], &tracer, &lamps, scene->lights, scene->light_count, s->points,
+                                  s->normals, VERTICES, STRATA, offset_mm, seed + (uint64_t)half);
+        s->rays = STRATA * STRATA * (lamps.count ? 2 : 1);
         verdict->rays_s = 0.5 * (alb_clock_s() - start_s) / VERTICES * (double)scene->mesh.vertex_count;
         compare(verdict, s);
     }
+    alb_shadow_lamps_free(&lamps);
     alb_tracer_free(&tracer);
     alb_mesh_free(&mesh);
     free(radiance);
