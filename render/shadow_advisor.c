@@ -3,8 +3,8 @@
 // Upper bound: the mean plus 3 standard errors of it over the vertices (squares of errors have long tails, and the
 // setting taken is the first that looked good), then the root. What receives only is no
 // occluder for the rays either: the error stated is that of the fields, not of what the method leaves out (bounces,
-// shadows that such objects would cast). Rays of the same error: that of N cosine rays in cells falls as N^(-2/3)
-// (measured, 64 to 1024), from half the mean of (a - b)^2 on.
+// shadows that such objects would cast). Rays of the same error, aimed at what emits: that of N in cells
+// falls as N^(-2/3) (measured, 64 to 1024), from half the mean of (a - b)^2 on.
 #include "render/shadow_advisor.h"
 #include "base/memory.h"
 #include "base/progress.h"
@@ -132,7 +132,7 @@ bool alb_shadow_advise(alb_shadow_stage *stage, alb_shadow_verdict *verdict, con
 {
     static const struct {
         int order, outer, inner, cells;
-    } ladder[] = {{4, 1, 0, 8}, {4, 2, 0, 8}, {4, 1, 2, 8}, {4, 2, 3, 8}, {6, 2, 3, 12}, {8, 3, 3, 16}};
+    } ladder[] = {{4, 1, 0, 8}, {8, 1, 0, 8}, {4, 1, 2, 8}, {4, 2, 3, 8}, {6, 2, 3, 12}, {8, 3, 3, 16}};
     double best = INFINITY;
     for (size_t k = 0; k < sizeof ladder / sizeof *ladder; k++) {
         alb_shadow_settings settings = alb_shadow_defaults;
