@@ -126,7 +126,8 @@ static void print_choice(const sequence *s)
 
 static bool report(const sequence *s, bool as_json, alb_error *error)
 {
-    const alb_shadow_settings *settings = &s->stage.settings;
+    const alb_shadow_stage *stage = &s->stage;
+    const alb_shadow_settings *settings = stage->occluder_count ? &stage->fields[0].settings : &stage->settings;
     if (!as_json) {
         printf(
             "%s: %d frames, %zu vertices, %zu occluders, stated error %.2g %% (within %.2g %%), %.1f ms sampling and "

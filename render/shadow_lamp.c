@@ -71,8 +71,9 @@ static void add_product(float (*irradiance)[3], const alb_shadow_block *b, const
 typedef struct glow {
     float points[3 * BLOCK], normals[3 * BLOCK];
     float groups[GROUPS][3][BLOCK]; // irradiance
-    float directions[3 * BLOCK];    // to the middle of a group
-    bool shaded;                    // some receivers' own objects hide something from them
+    const alb_shadow_sphere *light;
+    float directions[3 * BLOCK]; // to the middle of a group
+    bool shaded;                 // some receivers' own objects hide something from them
 } glow;
 
 ALB_VECTOR_CLONES static void add_sample(float (*restrict sum)[BLOCK], float *restrict nearest, const float *points,
@@ -123,6 +124,7 @@ static void find_glow(glow *g, const alb_shadow_block *b, const alb_shadow_emitt
         g->points[r] = (float)p.x, g->points[BLOCK + r] = (float)p.y, g->points[2 * BLOCK + r] = (float)p.z;
         g->normals[r] = (float)n.x, g->normals[BLOCK + r] = (float)n.y, g->normals[2 * BLOCK + r] = (float)n.z;
     }
+    g->light = sphere;
     g->shaded = false;
     for (size_t r = 0; r < b->count && !g->shaded; r++)
         for (size_t i = 0; b->own[r] != SIZE_MAX && i < VALUES; i++)
@@ -131,12 +133,19 @@ static void find_glow(glow *g, const alb_shadow_block *b, const alb_shadow_emitt
         add_group(g, emitter, group, b->count);
 }
 
-// Whether an occluder stands before a group of samples, seen from a receiver.
-static float before(const alb_shadow_block *b, const alb_shadow_world *world, size_t occluder, size_t r,
+// Whether an occluder stands before a group of samples, seen from a receiver. Around a light smaller than itself it is
+// a shade: of the light as a whole, also of what is before the shade's middle.
+static float before(const glow *g, const alb_shadow_block *b, const alb_shadow_world *world, size_t occluder, size_t r,
                     const alb_shadow_sphere *group)
 {
-    return (float)alb_shadow_share_before(&world->occluders[occluder].sphere, group, b->distances_mm[occluder][r],
-                                          alb_length(alb_sub(group->centre_mm, b->points[r])));
+    const alb_shadow_sphere *sphere = &world->occluders[occluder].sphere;
+    const double mm = b->distances_mm[occluder][r],
+                 part = alb_shadow_share_before(sphere, group, mm, alb_length(alb_sub(group->centre_mm, b->points[r]))),
+                 larger = fmin(2 * sphere->radius_mm / g->light->radius_mm - 1, 1);
+    if (!(larger > 0 && part < 1))
+        return (float)part;
+    const double whole_mm = alb_length(alb_sub(g->light->centre_mm, b->points[r]));
+    return (float)fmax(part, larger * alb_shadow_share_before(sphere, g->light, mm, whole_mm));
 }
 
 // visible[r] *= what the probes on a receiver's own object leave of the line's cosine.
@@ -153,7 +162,7 @@ static void take_hidden(float *visible, const glow *g, const alb_shadow_block *b
             hidden += b->hidden[i * BLOCK + r] * basis[i * BLOCK + r];
         for (size_t i = 0; i < 3; i++)
             cosine += g->normals[i * BLOCK + r] * g->directions[i * BLOCK + r];
-        visible[r] *= 1 - before(b, world, b->own[r], r, group) * fminf(fmaxf(hidden / fmaxf(cosine, 0.1F), 0), 1);
+        visible[r] *= 1 - before(g, b, world, b->own[r], r, group) * fminf(fmaxf(hidden / fmaxf(cosine, 0.1F), 0), 1);
     }
 }
 
@@ -182,7 +191,7 @@ static void find_visible(float *visible, const glow *g, const alb_shadow_block *
         alb_shadow_along(occlusion, &world->occluders[o], b->raised[o], g->directions, lines, b->count);
         for (size_t r = 0; r < b->count; r++)
             if (occlusion[r] > 0)
-                visible[r] *= 1 - before(b, world, o, r, group) * occlusion[r];
+                visible[r] *= 1 - before(g, b, world, o, r, group) * occlusion[r];
     }
 }
 
