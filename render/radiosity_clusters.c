@@ -113,13 +113,14 @@ static size_t cut_few(uint16_t *cluster, const placed *sorted, size_t n)
     return count;
 }
 
-// The hits of a cluster's rays: at equal steps through the area of its members, and through the row of each.
+// What the cluster's rays hit, the sky and backs left out: at equal steps through the area of its members, and through
+// the row of each.
 static void take_hits(alb_clusters *out, size_t which, const alb_form_factors *factors, uint32_t *row)
 {
     const uint32_t *members = out->members + out->first[which];
     const size_t count = out->first[which + 1] - out->first[which];
     const double step = out->areas_mm2[which] / ALB_CLUSTER_RAYS;
-    uint16_t *hits = out->hits + which * ALB_CLUSTER_RAYS;
+    uint16_t *hits = out->hits + out->first_hit[which];
     double before = 0;
     size_t q = 0;
     for (size_t k = 0; k < count; k++) {
@@ -129,10 +130,21 @@ static void take_hits(alb_clusters *out, size_t which, const alb_form_factors *f
         for (; q < ALB_CLUSTER_RAYS && (((double)q + 0.5) * step < before + area || k + 1 == count); q++) {
             const double into = fmin(fmax((((double)q + 0.5) * step - before) / area, 0), 1);
             const uint32_t hit = row[(size_t)fmin(into * rays, rays - 1)];
-            hits[q] = hit < out->patch_count ? out->cluster[hit] : (uint16_t)out->count;
+            if (hit < out->patch_count)
+                *hits++ = out->cluster[hit];
         }
         before += area;
     }
+    out->first_hit[which + 1] = (uint32_t)(hits - out->hits);
+}
+
+// Gives back what rays into the sky do not need.
+static void trim_hits(alb_clusters *clusters)
+{
+    const size_t kept = clusters->first_hit[clusters->count];
+    uint16_t *smaller = realloc(clusters->hits, (kept ? kept : 1) * sizeof *smaller);
+    if (smaller)
+        clusters->hits = smaller;
 }
 
 static void fill(alb_clusters *out, const placed *sorted, const alb_form_factors *factors, uint32_t *row)
@@ -146,6 +158,7 @@ static void fill(alb_clusters *out, const placed *sorted, const alb_form_factors
     }
     for (size_t which = 0; which < out->count; which++)
         take_hits(out, which, factors, row);
+    trim_hits(out);
 }
 
 // How many sources each patch has a say in, at equal steps through the area of its cluster's members; as places of the
@@ -207,9 +220,10 @@ bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, con
         ok = (clusters->members = alb_allocate(n, sizeof *clusters->members, error)) &&
              (clusters->first = alb_allocate(count + 1, sizeof *clusters->first, error)) &&
              (clusters->areas_mm2 = alb_allocate(count, sizeof *clusters->areas_mm2, error)) &&
+             (clusters->first_hit = alb_allocate(count + 1, sizeof *clusters->first_hit, error)) &&
              (clusters->hits = alb_allocate(count * ALB_CLUSTER_RAYS, sizeof *clusters->hits, error)) &&
              (clusters->kept = alb_allocate(count, sizeof *clusters->kept, error)) &&
-             (clusters->values = alb_allocate(count + 1, sizeof *clusters->values, error)) &&
+             (clusters->values = alb_allocate(count, sizeof *clusters->values, error)) &&
              (clusters->spreads = alb_allocate(count, sizeof *clusters->spreads, error)) &&
              (clusters->right = alb_allocate(count, sizeof *clusters->right, error)) &&
              (clusters->bounced = alb_allocate(count, sizeof *clusters->bounced, error));
@@ -231,6 +245,7 @@ void alb_clusters_free(alb_clusters *clusters)
     free(clusters->members);
     free(clusters->first);
     free(clusters->areas_mm2);
+    free(clusters->first_hit);
     free(clusters->hits);
     free(clusters->kept);
     free(clusters->values);
@@ -245,10 +260,10 @@ void alb_clusters_free(alb_clusters *clusters)
 size_t alb_clusters_bytes(const alb_clusters *clusters)
 {
     return clusters->patch_count * (sizeof *clusters->cluster + sizeof *clusters->members) +
-           (clusters->count + 1) * sizeof *clusters->first +
-           clusters->count *
-               (ALB_CLUSTER_RAYS * sizeof *clusters->hits + 3 * ALB_CLUSTER_SOURCES * sizeof *clusters->sources[0] +
-                sizeof *clusters->spreads + sizeof(double) + 3 * sizeof(alb_rgb) + sizeof *clusters->values);
+           (clusters->count + 1) * (sizeof *clusters->first + sizeof *clusters->first_hit) +
+           (clusters->first_hit ? clusters->first_hit[clusters->count] * sizeof *clusters->hits : 0) +
+           clusters->count * (3 * ALB_CLUSTER_SOURCES * sizeof *clusters->sources[0] + sizeof *clusters->spreads +
+                              sizeof(double) + 3 * sizeof(alb_rgb) + sizeof *clusters->values);
 }
 
 void alb_clusters_average(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *values)
@@ -277,37 +292,56 @@ static void take_values(const alb_clusters *clusters, const alb_rgb *from)
             clusters->values[k][c] = (float)from[k][c];
 }
 
+typedef float float4 __attribute__((vector_size(16), may_alias));
+
 // out = F_c radiosity
 ALB_VECTOR_CLONES
 static void gather(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity)
 {
-    typedef float float4 __attribute__((vector_size(16)));
+    const float4 *values = (const float4 *)clusters->values;
     take_values(clusters, radiosity);
 #pragma omp parallel for schedule(static) if (clusters->count > 256)
     for (size_t k = 0; k < clusters->count; k++) {
-        const uint16_t *hits = clusters->hits + k * ALB_CLUSTER_RAYS;
-        float4 sum = {0}, value;
-        for (int q = 0; q < ALB_CLUSTER_RAYS; q++) {
-            memcpy(&value, clusters->values[hits[q]], sizeof value);
-            sum += value;
-        }
+        const uint16_t *hits = clusters->hits + clusters->first_hit[k], *const end =
+                                                                            clusters->hits + clusters->first_hit[k + 1];
+        float4 lanes[4] = {{0}};
+        for (; end - hits >= 4; hits += 4)
+            for (int i = 0; i < 4; i++)
+                lanes[i] += values[hits[i]];
+        for (; hits < end; hits++)
+            lanes[0] += values[*hits];
+        const float4 sum = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
         for (int c = 0; c < 3; c++)
             out[k][c] = (double)sum[c] / ALB_CLUSTER_RAYS;
     }
+}
+
+// Means over the sources of cluster k.
+static void gather_sources(double means[3], const alb_clusters *clusters, size_t k)
+{
+    const uint16_t *sources[3];
+    float sums[2][3] = {{0}};
+    for (int c = 0; c < 3; c++)
+        sources[c] = clusters->sources[c] + k * ALB_CLUSTER_SOURCES;
+    for (int q = 0; q < ALB_CLUSTER_SOURCES; q += 2)
+        for (int odd = 0; odd < 2; odd++)
+            for (int c = 0; c < 3; c++)
+                sums[odd][c] += clusters->values[sources[c][q + odd]][c];
+    for (int c = 0; c < 3; c++)
+        means[c] = (double)(sums[0][c] + sums[1][c]) / ALB_CLUSTER_SOURCES;
 }
 
 void alb_clusters_scatter(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *light)
 {
     take_values(clusters, light);
 #pragma omp parallel for schedule(static) if (clusters->count > 256)
-    for (size_t k = 0; k < clusters->count; k++)
-        for (int c = 0; c < 3; c++) {
-            const uint16_t *sources = clusters->sources[c] + k * ALB_CLUSTER_SOURCES;
-            float sum = 0;
-            for (int q = 0; clusters->spreads[k] && q < ALB_CLUSTER_SOURCES; q++)
-                sum += clusters->values[sources[q]][c];
-            out[k][c] = clusters->kept[k][c] * (clusters->spreads[k] ? (double)sum / ALB_CLUSTER_SOURCES : light[k][c]);
-        }
+    for (size_t k = 0; k < clusters->count; k++) {
+        double means[3];
+        if (clusters->spreads[k])
+            gather_sources(means, clusters, k);
+        for (int c = 0; c < 3; c++)
+            out[k][c] = clusters->kept[k][c] * (clusters->spreads[k] ? means[c] : light[k][c]);
+    }
 }
 
 // out = F_c S_c x

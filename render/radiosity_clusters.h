@@ -9,13 +9,14 @@ typedef struct alb_clusters {
     uint16_t *cluster;             // of each patch
     uint32_t *members, *first;     // patches of cluster k: members[first[k] .. first[k + 1])
     double *areas_mm2;             // of each cluster
-    uint16_t *hits;                // [cluster * ALB_CLUSTER_RAYS + q]: cluster; `count` for the sky and backs
+    uint32_t *first_hit;           // what the rays of cluster k hit: clusters hits[first_hit[k] .. first_hit[k + 1]);
+    uint16_t *hits;                // of ALB_CLUSTER_RAYS the others see the sky and backs
     uint16_t *sources[3];          // [channel][cluster * ALB_CLUSTER_SOURCES + q]: whose light leaves from here
     bool *spreads;                 // of each cluster: light from others leaves from here
     alb_rgb *kept;                 // area mean of the row sums of S'
     const alb_rgb *sums;           // row sums of S'; borrowed
     const double *patch_areas_mm2; // borrowed
-    float (*values)[4];            // scratch of a product; the last is zero
+    float (*values)[4];            // scratch of a product
     alb_rgb *bounced, *right;      // scratch of a solution
 } alb_clusters;
 

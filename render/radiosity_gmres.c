@@ -147,15 +147,17 @@ bool alb_run_gmres(alb_run *run, alb_error *error)
     krylov *s = alb_allocate(1, sizeof *s, error);
     if (!s)
         return false;
-    for (int k = 0; k <= RESTART; k++)
-        if (!(s->v[k] = alb_allocate(n, sizeof(alb_rgb), error)))
-            goto done;
+    if (!(s->v[0] = alb_allocate(n, sizeof(alb_rgb), error)))
+        goto done;
     while (!over) {
         int steps = 0;
         const double before = report->residual;
         restart(run, s);
-        do
+        do {
+            if (!s->v[steps + 1] && !(s->v[steps + 1] = alb_allocate(n, sizeof(alb_rgb), error)))
+                goto done;
             extend(run, s, steps++);
+        }
         // a hair below what is wanted: rounding must not cost a restart
         while (steps < RESTART && report->iterations < ALB_PRODUCTS_MAX - 1 &&
                report->history[report->iterations - 1] > 0.98 * run->wanted);

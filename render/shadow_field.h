@@ -10,12 +10,10 @@
 #include "render/shadow_view.h"
 
 enum {
-    ALB_SHADOW_INNER_MAX = 3,
+    ALB_SHADOW_INNER_MAX = 6,
     ALB_SHADOW_OUTER_MAX = 6,
     ALB_SHADOW_SHELLS_MAX = ALB_SHADOW_INNER_MAX + ALB_SHADOW_OUTER_MAX + 1,
     ALB_SHADOW_PROBES_MAX = 4096,
-    ALB_SHADOW_FAR_ORDER = 6, // of the far shell and its grid: far away an object is small, finer bands of it matter
-    ALB_SHADOW_FAR_CELLS = 5  // more than nodes do; together as many numbers as order 4 with 8 cells
 };
 
 // Fields know of probes only that their number is within bounds: who lights with fields makes the surfaces.
@@ -26,7 +24,8 @@ typedef struct alb_shadow_settings {
     double distance; // of the first shell outside from the middle, in radii of the bounding sphere
     int outer;       // shells outside, 1 to ALB_SHADOW_OUTER_MAX
     int inner;       // shells inside, 0 to ALB_SHADOW_INNER_MAX; occlusion only
-    bool far;        // one more at 2.9 radii, beyond the others, of ALB_SHADOW_FAR_ORDER; occlusion only
+    bool far;        // one more at 2.9 radii, beyond the others, of order 8 on half the cells: from afar finer bands
+                     // matter more than nodes do; occlusion only
     int rays;        // from each inner node
     int probes;      // on the object's own surface (shadow_surface.h), 0 to ALB_SHADOW_PROBES_MAX; occlusion only
     double cluster;  // vertices within about so many radii move as one in pictures from outside; 0: each for itself
@@ -38,6 +37,7 @@ extern const alb_shadow_settings alb_shadow_light_settings;
 typedef struct alb_shadow_shell {
     double radius; // in radii of the bounding sphere
     int order, cells;
+    bool turns;   // the far one: samples are in the frames of their nodes' axes and turn with the receiver's
     size_t first; // of its samples among all
 } alb_shadow_shell;
 
@@ -49,7 +49,7 @@ typedef struct alb_shadow_field {
     alb_shadow_shell shells[ALB_SHADOW_SHELLS_MAX]; // by radius, ascending
     float *samples;                                 // [shell][node][channel][order^2]
     size_t sample_count;                            // floats
-    size_t replaced; // inner nodes that lie inside the object: they hold what the shell outside them gives, scaled
+    size_t moved;                     // inner nodes that lie inside the object: they see from just outside of it
     struct alb_shadow_studio *studio; // what pictures are taken with
 } alb_shadow_field;
 
@@ -63,6 +63,6 @@ void alb_shadow_field_free(alb_shadow_field *field);
 bool alb_shadow_field_sample(alb_shadow_field *field, const alb_vector *vertices, alb_error *error);
 size_t alb_shadow_field_bytes(const alb_shadow_field *field);
 
-// The samples of a shell interpolated at a direction from the middle: out[channel][order^2], order
-// that of the shell.
+// The samples of a shell interpolated at a direction from the middle: out[channel][order^2], order that of the shell,
+// in the world's frame; of one that turns in the frame of the axis -direction (sh_rotate.h), and one channel.
 void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, alb_vector direction);

@@ -34,18 +34,24 @@ void alb_shadow_lattice_free(alb_shadow_lattice *lattice)
     *lattice = (alb_shadow_lattice){0};
 }
 
-bool alb_shadow_lattice_look(float *out, const alb_shadow_lattice *lattice, const alb_tracer *tracer, alb_vector from)
+bool alb_shadow_lattice_look(float *out, alb_vector *from, const alb_shadow_lattice *lattice, const alb_tracer *tracer)
 {
     const size_t values = (size_t)(lattice->order * lattice->order);
-    int backs = 0;
+    double nearest_mm = INFINITY;
+    int backs = 0, towards = 0;
     memset(out, 0, values * sizeof *out);
     for (int q = 0; q < lattice->count; q++) {
         alb_hit hit;
-        if (!alb_tracer_closest(&hit, tracer, from, lattice->directions[q]))
+        if (!alb_tracer_closest(&hit, tracer, *from, lattice->directions[q]))
             continue;
         backs += !hit.front;
+        if (hit.distance_mm < nearest_mm)
+            nearest_mm = hit.distance_mm, towards = q;
         for (size_t i = 0; i < values; i++)
             out[i] += lattice->basis[(size_t)q * values + i];
     }
-    return 2 * backs <= lattice->count;
+    if (2 * backs <= lattice->count)
+        return true;
+    *from = alb_add(*from, alb_times(nearest_mm + 256 * tracer->slack_mm, lattice->directions[towards]));
+    return false;
 }

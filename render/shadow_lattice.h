@@ -10,5 +10,6 @@ typedef struct alb_shadow_lattice {
 
 bool alb_shadow_lattice_create(alb_shadow_lattice *lattice, int count, int order, alb_error *error);
 void alb_shadow_lattice_free(alb_shadow_lattice *lattice);
-// out[order^2] of occlusion. False where the place is inside the object: more than half of the rays meet a back first.
-bool alb_shadow_lattice_look(float *out, const alb_shadow_lattice *lattice, const alb_tracer *tracer, alb_vector from);
+// out[order^2] of occlusion. False where the place is inside the object, as more than half of the rays meet a back
+// first: *from is then just behind the nearest hit.
+bool alb_shadow_lattice_look(float *out, alb_vector *from, const alb_shadow_lattice *lattice, const alb_tracer *tracer);

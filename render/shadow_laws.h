@@ -6,7 +6,7 @@ enum { ALB_SHADOW_ORDER = 4, ALB_SHADOW_VALUES = ALB_SHADOW_ORDER * ALB_SHADOW_O
 
 typedef struct alb_shadow_laws {
     alb_sh_batch outer; // occlusion from nodes that have all of the object in front of them
-    alb_sh_batch far;   // the same from the far shell
+    alb_sh_batch far;   // the same from the far shell, from order ALB_SH_ORDER_MAX
     alb_sh_batch inner; // occlusion from nodes that have it all around
     alb_sh_batch light; // a light's radiance, order 4
     alb_sh_batch sky;   // radiance of an environment of finite size, from order ALB_SH_ORDER_MAX

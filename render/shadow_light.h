@@ -1,5 +1,6 @@
 // Irradiance of receivers from skies and lights with fields, in the soft shadows of occluders with fields.
 #pragma once
+#include "render/shadow_emitter.h"
 #include "render/shadow_field.h"
 #include "render/shadow_laws.h"
 #include "render/shadow_sky.h"
@@ -11,6 +12,7 @@ enum { ALB_SHADOW_OCCLUDERS_MAX = 64 };
 // What lights and what hides; all borrowed.
 typedef struct alb_shadow_world {
     const alb_shadow_field *occluders, *lights;
+    const alb_shadow_emitter *emitters; // of the lights; NULL: each light is its field alone, in products of order 4
     const alb_shadow_sky *skies;
     size_t occluder_count, light_count, sky_count; // at most ALB_SHADOW_OCCLUDERS_MAX occluders
     const alb_shadow_laws *laws;
@@ -31,7 +33,7 @@ bool alb_shadow_irradiance(float (*irradiance)[3], const alb_shadow_world *world
                            const alb_vector *normals, size_t count, alb_shadow_seconds *seconds, alb_error *error);
 
 // Of the receivers that face a light with a field, the share from which its bounding sphere is less than
-// ALB_SHADOW_SMALL_DEG in half-angle: order 4 then blurs its shadows (rms .14 of the irradiance).
+// ALB_SHADOW_SMALL_DEG in half-angle: order 4 then blurs what objects hide of it from themselves.
 #define ALB_SHADOW_SMALL_DEG 20
 double alb_shadow_small_lights(const alb_shadow_world *world, const alb_vector *points, const alb_vector *normals,
                                size_t count);

@@ -1,6 +1,7 @@
 // Between two shells both speak: the outer one by t^2 (3 - 2 t), t the place between them in the logarithm of the
 // distance. Further out or in, the last one alone. Weights and k are continuous, so that nothing pops where a receiver
-// crosses a shell or the bounding sphere.
+// crosses a shell or the bounding sphere. Where nodes of a shell are buried inside the object, the shell speaks that
+// much less, and the other more.
 #include "render/shadow_receivers.h"
 #include "render/sh_rotate.h"
 #include <string.h>
@@ -51,8 +52,8 @@ bool alb_shadow_receivers_weigh(alb_shadow_receivers *receivers, const alb_shado
 static void add_scaled(float *out, const alb_shadow_receivers *receivers, const alb_shadow_field *field, int shell,
                        const alb_sh_batch *law)
 {
-    const int order = field->shells[shell].order;
-    const size_t values = (size_t)(order * order), count = receivers->count;
+    const alb_shadow_shell *of = &field->shells[shell];
+    const size_t values = (size_t)(of->order * of->order), count = receivers->count;
     float samples[ALB_SH_COUNT_MAX * BLOCK], scaled[VALUES * BLOCK], one[ALB_SH_COUNT_MAX];
     memset(samples, 0, values * BLOCK * sizeof *samples);
     for (size_t r = 0; r < count; r++) {
@@ -60,23 +61,28 @@ static void add_scaled(float *out, const alb_shadow_receivers *receivers, const 
         for (size_t i = 0; i < values; i++)
             samples[i * BLOCK + r] = one[i];
     }
-    alb_sh_to_axis_batch(samples, samples, order, receivers->axes, BLOCK, count);
+    if (!of->turns)
+        alb_sh_to_axis_batch(samples, samples, of->order, receivers->axes, BLOCK, count);
     alb_sh_batch_apply(scaled, law, false, receivers->k, samples, BLOCK, count);
     for (size_t i = 0; i < VALUES; i++)
         for (size_t r = 0; r < count; r++)
             out[i * BLOCK + r] += receivers->weights[r] * scaled[i * BLOCK + r];
 }
 
+static const alb_sh_batch *law_of(const alb_shadow_laws *laws, const alb_shadow_field *field, int shell)
+{
+    const int outer = shell - field->settings.inner;
+    if (outer < 0)
+        return &laws->inner;
+    return outer == field->settings.outer ? &laws->far : &laws->outer;
+}
+
 void alb_shadow_receivers_occlusion(float *out, alb_shadow_receivers *receivers, const alb_shadow_field *field,
                                     const alb_shadow_laws *laws)
 {
     memset(out, 0, VALUES * BLOCK * sizeof *out);
-    const int inner = field->settings.inner, far = field->settings.far ? field->shell_count - 1 : field->shell_count;
     for (int shell = 0; shell < field->shell_count; shell++)
         if (alb_shadow_receivers_weigh(receivers, field, shell))
-            add_scaled(out, receivers, field, shell,
-                       shell < inner ? &laws->inner
-                       : shell < far ? &laws->outer
-                                     : &laws->far);
+            add_scaled(out, receivers, field, shell, law_of(laws, field, shell));
     alb_sh_from_axis_batch(out, out, ALB_SHADOW_ORDER, receivers->axes, BLOCK, receivers->count);
 }

@@ -3,6 +3,7 @@
 #include "render/shadow_stage.h"
 #include "base/memory.h"
 #include "base/progress.h"
+#include "render/shadow_cut.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,50 +14,46 @@ static bool emits(const alb_scene *scene, size_t face)
     return e[0] + e[1] + e[2] > 0;
 }
 
-// The faces of one object, and what they send.
-static bool cut_out(alb_mesh *mesh, float (**radiance)[3], const alb_scene *scene, const alb_object *object,
-                    alb_error *error)
+// Of a light's field samples make no use but of its sphere.
+static const alb_shadow_settings sphere_alone = {.order = 2, .cells = 1, .pixels = 8, .distance = 1.1, .outer = 1};
+
+static bool add_light(alb_shadow_stage *stage, size_t index, const alb_mesh *mesh, const float (*radiance)[3],
+                      alb_error *error)
 {
-    const alb_mesh *all = &scene->mesh;
-    bool ok = (*radiance = alb_allocate(all->face_count, sizeof **radiance, error)) != NULL;
-    for (size_t v = 0; ok && v < object->vertex_count; v++)
-        ok = alb_mesh_add_vertex(mesh, all->vertices[object->first_vertex + v], error);
-    for (size_t f = 0; ok && f < all->face_count; f++) {
-        if (!alb_object_owns(object, all->faces[f][0]))
-            continue;
-        const size_t count = mesh->face_count;
-        uint32_t at[3];
-        for (int k = 0; k < 3; k++)
-            at[k] = all->faces[f][k] - (uint32_t)object->first_vertex;
-        ok = alb_mesh_add_face(mesh, at[0], at[1], at[2], 0, error);
-        for (int c = 0; c < 3 && mesh->face_count > count; c++)
-            (*radiance)[count][c] = (float)(scene->surfaces[all->groups[f]].exitance[c] / M_PI);
-    }
-    return ok;
+    const alb_shadow_settings *settings = stage->paper ? &alb_shadow_light_settings : &sphere_alone;
+    if (!alb_shadow_field_create(&stage->fields[index], settings, mesh, radiance, stage->names[index], error))
+        return false;
+    stage->light_count++;
+    return stage->paper || alb_shadow_emitter_create(&stage->emitters[stage->light_count - 1], mesh, radiance, error);
 }
 
-static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o, bool light, alb_error *error)
+static bool add_occluder(alb_shadow_stage *stage, size_t index, const alb_mesh *mesh, int order, alb_error *error)
+{
+    alb_shadow_settings settings = stage->settings;
+    settings.order = order;
+    if (!alb_shadow_field_create(&stage->fields[index], &settings, mesh, NULL, stage->names[index], error))
+        return false;
+    stage->occluder_count++;
+    return !settings.probes ||
+           alb_shadow_surface_create(&stage->surfaces[index], mesh, stage->normals + stage->first_vertices[index],
+                                     (size_t)settings.probes, error);
+}
+
+// An object of which no face is left (all stood there twice, say) is not there.
+static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o, bool light, int order,
+                      alb_error *error)
 {
     const size_t index = stage->occluder_count + stage->light_count;
-    alb_shadow_settings settings = stage->settings;
     alb_mesh mesh = {0};
     float(*radiance)[3] = NULL;
-    if (light)
-        settings = alb_shadow_light_settings;
     stage->objects[index] = o;
     stage->first_vertices[index] = scene->objects[o].first_vertex;
     snprintf(stage->names[index], sizeof *stage->names, "object %zu", o);
     stage->of_body[index] = scene->objects[o].rigid && !light;
-    const bool ok =
-        cut_out(&mesh, &radiance, scene, &scene->objects[o], error) &&
-        alb_shadow_field_create(&stage->fields[index], &settings, &mesh, light ? (const float(*)[3])radiance : NULL,
-                                stage->names[index], error) &&
-        (light || !settings.probes ||
-         alb_shadow_surface_create(&stage->surfaces[index], &mesh, stage->normals + scene->objects[o].first_vertex,
-                                   (size_t)settings.probes, error));
-    if (!ok)
-        alb_shadow_field_free(&stage->fields[index]);
-    *(light ? &stage->light_count : &stage->occluder_count) += ok;
+    bool ok = alb_shadow_cut_one(&mesh, &radiance, scene, &scene->objects[o], error);
+    if (ok && mesh.face_count)
+        ok = light ? add_light(stage, index, &mesh, (const float(*)[3])radiance, error)
+                   : add_occluder(stage, index, &mesh, order, error);
     free(radiance);
     alb_mesh_free(&mesh);
     return ok;
@@ -76,6 +73,9 @@ static void free_fields(alb_shadow_stage *stage)
 {
     for (size_t i = 0; stage->fields && i < stage->occluder_count + stage->light_count; i++)
         alb_shadow_field_free(&stage->fields[i]);
+    for (size_t i = 0; stage->emitters && i < stage->light_count; i++)
+        alb_shadow_emitter_free(&stage->emitters[i]);
+    free(stage->emitters);
     free(stage->fields);
     free(stage->objects);
     free(stage->names);
@@ -147,10 +147,11 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
 {
     const alb_mesh *mesh = &scene->mesh;
     const size_t n = scene->object_count;
-    bool *shines = NULL;
+    bool *shines = NULL, any = false;
     bool ok = (stage->fields = alb_allocate(n, sizeof *stage->fields, error)) &&
               (stage->objects = alb_allocate(n, sizeof *stage->objects, error)) &&
               (stage->names = alb_allocate(n, sizeof *stage->names, error)) &&
+              (stage->paper || (stage->emitters = alb_allocate(n, sizeof *stage->emitters, error))) &&
               (stage->of_body = alb_allocate(n, sizeof *stage->of_body, error)) &&
               (stage->surfaces = alb_allocate(n, sizeof *stage->surfaces, error)) &&
               (stage->first_vertices = alb_allocate(n, sizeof *stage->first_vertices, error)) &&
@@ -161,10 +162,14 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
               find_lights(&shines, scene, error);
     if (ok)
         set_normals(stage->normals, mesh);
+    for (size_t o = 0; ok && o < n; o++)
+        any |= shines[o];
+    // lights with a surface are seen along lines: the finer the samples the better
+    const int order = any && !stage->paper ? ALB_SH_ORDER_MAX : stage->settings.order;
     for (int light = 0; light < 2; light++) // occluders first
         for (size_t o = 0; ok && o < n; o++)
             if (shines[o] == (light == 1) && (light || !scene->objects[o].receives_only))
-                ok = add_field(stage, scene, o, light, error);
+                ok = add_field(stage, scene, o, light, order, error);
     ok = ok && create_transport(stage, scene, shines, error);
     free(shines);
     if (!ok)
@@ -173,13 +178,13 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
     memcpy(stage->groups, mesh->groups, mesh->face_count * sizeof *stage->groups);
     stage->face_count = mesh->face_count;
     stage->vertex_count = mesh->vertex_count;
-    if (stage->laws_order == stage->settings.order)
+    if (stage->laws_order == order)
         return true;
     alb_shadow_laws_free(&stage->laws);
     stage->laws_order = 0;
-    if (!alb_shadow_laws_create(&stage->laws, stage->settings.order, stage->paper, error))
+    if (!alb_shadow_laws_create(&stage->laws, order, stage->paper, error))
         return false;
-    stage->laws_order = stage->settings.order;
+    stage->laws_order = order;
     return true;
 }
 
@@ -215,6 +220,7 @@ alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage)
                               .occluder_count = stage->occluder_count,
                               .lights = stage->fields + stage->occluder_count,
                               .light_count = stage->light_count,
+                              .emitters = stage->emitters,
                               .skies = stage->skies,
                               .sky_count = stage->sky_count,
                               .laws = &stage->laws,
@@ -247,6 +253,11 @@ bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb
         if (stage->light_count || !stage->of_body[i]) // skies have the transport of what is rigid
             ok = alb_shadow_surface_sample(&stage->surfaces[i], mesh->vertices + stage->first_vertices[i],
                                            stage->normals + stage->first_vertices[i], error);
+    for (size_t i = 0; ok && stage->emitters && i < stage->light_count; i++) {
+        const size_t light = stage->occluder_count + i;
+        ok = alb_shadow_emitter_place(&stage->emitters[i], mesh->vertices + stage->first_vertices[light],
+                                      &stage->fields[light].sphere, error);
+    }
     const double sampled_s = alb_clock_s();
     if (ok) {
         const alb_shadow_world world = alb_shadow_stage_world(stage);

@@ -4,13 +4,14 @@
 #include "render/shadow_light.h"
 
 typedef struct alb_shadow_stage {
-    alb_shadow_settings settings; // of occluders; lights have alb_shadow_light_settings
+    alb_shadow_settings settings; // of occluders; where lights have a surface their order is ALB_SH_ORDER_MAX
     bool paper;                   // scaling as printed
     uint32_t (*faces)[3];         // of the scene for which the fields were made
     uint16_t *groups;
     size_t face_count, vertex_count;
-    alb_shadow_field *fields; // of the occluders and then of the lights
-    size_t *objects;          // index of each in the scene
+    alb_shadow_field *fields;     // of the occluders and then of the lights
+    alb_shadow_emitter *emitters; // of the lights, unless as printed
+    size_t *objects;              // index of each in the scene
     char (*names)[32];
     size_t occluder_count, light_count;
     alb_shadow_transport transport; // of what is rigid, for the skies
