@@ -1,6 +1,7 @@
 // F_kj, the share of the flux leaving k that arrives at j, by R cosine-weighted rays from every patch:
 //     F_kj = (number of rays of k that hit j) / R
-// (render/form_factor_cast.c: their pattern; render/form_factor_rows.c: how they are kept and multiplied.)
+// (render/form_factor_cast.c: their pattern; render/form_factor_rows.c: how they are kept and multiplied;
+// render/form_factor_share.c: what neighbours have in common.)
 // A row of F only ever integrates a bounded function over the hemisphere, which is why a few hundred equal weights do
 // for any number of patches. The rows hold exactly (they sum to 1 with the sky); reciprocity A_k F_kj = A_j F_jk holds
 // only statistically. Never symmetrised or normalised: that raises the error. Exact factors (form_factor_exact.h) for
