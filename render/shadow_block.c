@@ -50,7 +50,7 @@ static void find_own(alb_shadow_block *b, const alb_shadow_world *world)
         const alb_shadow_surface *surface = &world->surfaces[o];
         for (size_t r = 0; r < b->count; r++) {
             const size_t v = b->first + r - world->first_vertices[o];
-            if (!surface->probe_count || v >= surface->mesh.vertex_count)
+            if (!surface->probes.count || v >= surface->mesh.vertex_count)
                 continue;
             b->own[r] = o;
             for (size_t i = 0; i < VALUES; i++)
