@@ -5,7 +5,8 @@
 // Scene: three bowls and an animal on a table. Error: |B - B'| / |B'|, area-weighted 2-norm, worst channel, B' solved
 // to 1e-6 with the same rays, rms over four lights that the columns were not made for: the scene's own (a sky and a
 // lamp), the lamp alone, a spot of 10 degrees on a bowl's wall, and a point of light inside a bowl. Narrow matrices
-// state their error as well, over lights at random. "S' alone": one product with it, which every kind needs.
+// state their error as well, over lights at random. "S' alone": one product with it, which every kind needs, by links
+// or by stored weights, which say their error over lights with sharp edges. B' is found by links.
 #include "base/memory.h"
 #include "base/plot.h"
 #include "base/progress.h"
@@ -16,10 +17,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { RUNS = 5, RESIDUALS = 4, RANKS = 3, KINDS = 3, POINTS = 4, LIGHTS = 4 };
+enum { RUNS = 5, RESIDUALS = 4, RANKS = 3, KINDS = 4, POINTS = 4, LIGHTS = 4 };
 static const double residuals[RESIDUALS] = {1e-1, 1e-2, 1e-3, 1e-4};
-static const int ranks[KINDS][RANKS] = {{0}, {16, 48, 128}, {8, 16, 32}};
-static const char *const kinds[KINDS] = {"solution", "narrow", "narrow, exact bounce"};
+static const int ranks[KINDS][RANKS] = {{0}, {0}, {16, 48, 128}, {8, 16, 32}};
+static const char *const kinds[KINDS] = {"solution by links", "solution by weights", "narrow", "narrow, exact bounce"};
+static const double weights_error = 0.005;
 
 typedef struct bench {
     alb_scene scene;
@@ -112,12 +114,12 @@ static void print(const bench *b, int kind, int point, double setting, const alb
     fflush(stdout);
 }
 
-static bool measure_solutions(bench *b, alb_error *error)
+static bool measure_solutions(bench *b, int kind, alb_error *error)
 {
     for (int k = 0; k < RESIDUALS; k++) {
-        if (!measure(b, 0, k, by_solution, &residuals[k], error))
+        if (!measure(b, kind, k, by_solution, &residuals[k], error))
             return false;
-        print(b, 0, k, residuals[k], NULL, 0);
+        print(b, kind, k, residuals[k], NULL, 0);
     }
     return true;
 }
@@ -127,7 +129,7 @@ static bool measure_narrow(bench *b, int kind, alb_error *error)
     for (int k = 0; k < RANKS; k++) {
         alb_relight narrow, *const setting = &narrow;
         const double start_s = alb_clock_s();
-        if (!alb_relight_create(&narrow, &b->s.equations, &b->s.patches, ranks[kind][k], kind == 2, 1, error))
+        if (!alb_relight_create(&narrow, &b->s.equations, &b->s.patches, ranks[kind][k], kind == 3, 1, error))
             return false;
         const double made_s = alb_clock_s() - start_s;
         const bool ok = measure(b, kind, k, by_columns, &setting, error);
@@ -150,6 +152,18 @@ static void print_scattering(bench *b)
     printf("%-22s %8s %8s %8s %8.2f %8.1f\n", "S' alone", "", "", "", 1e3 * best, 1 / best);
 }
 
+static bool make_weights(bench *b, alb_error *error)
+{
+    double percent;
+    const double start_s = alb_clock_s(), links_mb = 1e-6 * (double)alb_scatter_bytes(&b->s.scatter);
+    if (!alb_scatter_keep_weights(&b->s.scatter, weights_error, &percent, error))
+        return false;
+    printf("%-22s %8g %53.3f %8.1f %8.1f\n", "weights beside links", weights_error, percent, alb_clock_s() - start_s,
+           1e-6 * (double)alb_scatter_bytes(&b->s.scatter) - links_mb);
+    print_scattering(b);
+    return true;
+}
+
 static bool chart(const bench *b, const char *path, alb_error *error)
 {
     alb_curve curves[KINDS] = {{0}};
@@ -157,7 +171,7 @@ static bool chart(const bench *b, const char *path, alb_error *error)
         curves[k] = (alb_curve){.label = kinds[k],
                                 .x = b->seconds[k],
                                 .y = b->error_percent[k],
-                                .count = k ? RANKS : RESIDUALS,
+                                .count = k > 1 ? RANKS : RESIDUALS,
                                 .mark = ALB_MARK_LINE_AND_POINTS};
     const alb_panel panel = {.title = "Relighting fixed materials: error of the radiosity against time",
                              .x_label = "seconds a relight",
@@ -185,7 +199,8 @@ int main(int argc, char **argv)
                "worst, %", "ms", "fps", "stated", "made, s", "MB");
         print_scattering(&b);
     }
-    ok = ok && measure_solutions(&b, &error) && measure_narrow(&b, 1, &error) && measure_narrow(&b, 2, &error);
+    ok = ok && measure_solutions(&b, 0, &error) && make_weights(&b, &error) && measure_solutions(&b, 1, &error) &&
+         measure_narrow(&b, 2, &error) && measure_narrow(&b, 3, &error);
     if (ok && argc > 1)
         ok = chart(&b, argv[1], &error);
     if (!ok)
