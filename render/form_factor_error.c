@@ -16,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WINDOW = 16, ROUNDS = 3, STEPS = 60 };
+enum { WINDOW = 16, ROUNDS = 5, STEPS = 60 };
 
 static const double quantile = 2.33; // of the normal distribution at 99 %: refining stops at a draw that looks good
 static const double growth = 1.2;    // of a row's rays in a step

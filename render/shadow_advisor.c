@@ -3,12 +3,13 @@
 // Upper bound: the mean plus 3 standard errors of it over the vertices (squares of errors have long tails, and the
 // setting taken is the first that looked good), then the root. What receives only is no
 // occluder for the rays either: the error stated is that of the fields, not of what the method leaves out (bounces,
-// shadows that such objects would cast). Rays of the same error: that of N cosine rays in cells falls as N^(-2/3)
-// (measured, 64 to 1024), from half the mean of (a - b)^2 on.
+// shadows that such objects would cast). Rays of the same error, aimed at what emits: that of N in cells
+// falls as N^(-2/3) (measured, 64 to 1024), from half the mean of (a - b)^2 on.
 #include "render/shadow_advisor.h"
 #include "base/memory.h"
 #include "base/progress.h"
 #include "base/random.h"
+#include "render/shadow_cut.h"
 #include "render/shadow_rays.h"
 #include <stdlib.h>
 
@@ -17,26 +18,17 @@ enum { VERTICES = 400, STRATA = 12 };
 typedef struct samples {
     alb_vector points[VERTICES], normals[VERTICES];
     float found[VERTICES][3], halves[2][VERTICES][3];
+    int rays; // of a half
 } samples;
 
 // The faces of all that casts or emits, and what they send.
 static bool collect(alb_mesh *mesh, float (**radiance)[3], const alb_shadow_stage *stage, const alb_scene *scene,
                     alb_error *error)
 {
-    const alb_mesh *all = &scene->mesh;
-    bool ok = (*radiance = alb_allocate(all->face_count, sizeof **radiance, error)) != NULL;
-    for (size_t v = 0; ok && v < all->vertex_count; v++)
-        ok = alb_mesh_add_vertex(mesh, all->vertices[v], error);
-    for (size_t f = 0; ok && f < all->face_count; f++) {
-        bool used = false;
-        for (size_t i = 0; i < stage->occluder_count + stage->light_count && !used; i++)
-            used = alb_object_owns(&scene->objects[stage->objects[i]], all->faces[f][0]);
-        const size_t count = mesh->face_count;
-        ok = !used || alb_mesh_add_face(mesh, all->faces[f][0], all->faces[f][1], all->faces[f][2], 0, error);
-        for (int c = 0; c < 3 && mesh->face_count > count; c++)
-            (*radiance)[count][c] = (float)(scene->surfaces[all->groups[f]].exitance[c] / M_PI);
-    }
-    return ok;
+    bool chosen[ALB_OBJECTS_MAX] = {false};
+    for (size_t i = 0; i < stage->occluder_count + stage->light_count; i++)
+        chosen[stage->objects[i]] = true;
+    return alb_shadow_cut(mesh, radiance, scene, chosen, error);
 }
 
 static bool emits(const alb_shadow_stage *stage, const alb_scene *scene, size_t vertex)
@@ -96,13 +88,14 @@ static void compare(alb_shadow_verdict *verdict, const samples *s)
             continue;
         if (!(percent <= worst)) {
             worst = percent;
-            verdict->rays = STRATA * STRATA * pow(random / fmax(square, 1e-6 * mean * mean), 0.75);
+            verdict->rays = pow(random / fmax(square, 1e-6 * mean * mean), 0.75);
         }
         upper = fmax(100 * sqrt(fmax(square + 3 * spread, 0)) / mean, isnan(upper) ? 0 : upper);
     }
     verdict->percent = worst;
     verdict->upper_percent = upper;
-    verdict->rays_s *= verdict->rays / (STRATA * STRATA);
+    verdict->rays_s *= verdict->rays;
+    verdict->rays *= s->rays;
 }
 
 bool alb_shadow_error(alb_shadow_verdict *verdict, const alb_shadow_stage *stage, const alb_scene *scene, uint64_t seed,
@@ -110,19 +103,23 @@ bool alb_shadow_error(alb_shadow_verdict *verdict, const alb_shadow_stage *stage
 {
     alb_mesh mesh = {0};
     alb_tracer tracer = {0};
+    alb_shadow_lamps lamps = {0};
     float(*radiance)[3] = NULL;
     samples *s = alb_allocate(1, sizeof *s, error);
     *verdict = (alb_shadow_verdict){NAN, NAN, NAN, NAN};
-    const bool ok = s && collect(&mesh, &radiance, stage, scene, error) && alb_tracer_create(&tracer, &mesh, error);
+    const bool ok = s && collect(&mesh, &radiance, stage, scene, error) && alb_tracer_create(&tracer, &mesh, error) &&
+                    alb_shadow_lamps_create(&lamps, &mesh, (const float(*)[3])radiance, error);
     const double offset_mm = 256 * tracer.slack_mm;
     if (ok && draw(s, &tracer, stage, scene, offset_mm, seed)) {
         const double start_s = alb_clock_s();
         for (int half = 0; half < 2; half++)
-            alb_shadow_cast(s->halves[half], &tracer, (const float(*)[3])radiance, scene->lights, scene->light_count,
-                            s->points, s->normals, VERTICES, STRATA, offset_mm, seed + (uint64_t)half);
+            alb_shadow_cast_aimed(s->halves[half], &tracer, &lamps, scene->lights, scene->light_count, s->points,
+                                  s->normals, VERTICES, STRATA, offset_mm, seed + (uint64_t)half);
+        s->rays = STRATA * STRATA * (lamps.count ? 2 : 1);
         verdict->rays_s = 0.5 * (alb_clock_s() - start_s) / VERTICES * (double)scene->mesh.vertex_count;
         compare(verdict, s);
     }
+    alb_shadow_lamps_free(&lamps);
     alb_tracer_free(&tracer);
     alb_mesh_free(&mesh);
     free(radiance);
@@ -135,7 +132,7 @@ bool alb_shadow_advise(alb_shadow_stage *stage, alb_shadow_verdict *verdict, con
 {
     static const struct {
         int order, outer, inner, cells;
-    } ladder[] = {{4, 1, 0, 8}, {4, 2, 0, 8}, {4, 1, 2, 8}, {4, 2, 3, 8}, {6, 2, 3, 12}, {8, 3, 3, 16}};
+    } ladder[] = {{4, 1, 0, 8}, {8, 1, 0, 8}, {4, 1, 2, 8}, {4, 2, 3, 8}, {6, 2, 6, 12}, {8, 3, 6, 16}};
     double best = INFINITY;
     for (size_t k = 0; k < sizeof ladder / sizeof *ladder; k++) {
         alb_shadow_settings settings = alb_shadow_defaults;

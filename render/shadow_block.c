@@ -50,7 +50,7 @@ static void find_own(alb_shadow_block *b, const alb_shadow_world *world)
         const alb_shadow_surface *surface = &world->surfaces[o];
         for (size_t r = 0; r < b->count; r++) {
             const size_t v = b->first + r - world->first_vertices[o];
-            if (!surface->probe_count || v >= surface->mesh.vertex_count)
+            if (!surface->probes.count || v >= surface->mesh.vertex_count)
                 continue;
             b->own[r] = o;
             for (size_t i = 0; i < VALUES; i++)
@@ -59,13 +59,12 @@ static void find_own(alb_shadow_block *b, const alb_shadow_world *world)
     }
 }
 
-// Where receivers look the field up: from within its sphere a tenth of the radius above their surface, for the nodes
-// around lie partly below it, where all is dark.
-static void raise(alb_vector *points, const alb_shadow_block *b, const alb_shadow_sphere *sphere)
+// Where receivers look the field up: from within its sphere a share of the radius above their surface.
+static void raise(alb_vector *points, const alb_shadow_block *b, const alb_shadow_sphere *sphere, double share)
 {
     for (size_t r = 0; r < b->count; r++) {
         const double x = alb_length(alb_sub(b->points[r], sphere->centre_mm)) / sphere->radius_mm;
-        const double rise_mm = 0.1 * sphere->radius_mm * fmin(fmax(4 * (1 - x), 0), 1);
+        const double rise_mm = share * sphere->radius_mm * fmin(fmax(4 * (1 - x), 0), 1);
         points[r] = alb_add(b->points[r], alb_times(rise_mm, b->normals[r]));
     }
 }
@@ -84,7 +83,9 @@ static void find_occlusions(alb_shadow_block *b, const alb_shadow_world *world)
         const alb_shadow_field *field = &world->occluders[o];
         const double radius = field->sphere.radius_mm;
         b->hides[o] = false;
-        raise(b->raised[o], b, &field->sphere);
+        // an object's own vertices have nodes below their surface; those of others, if it has probes, do not, and find
+        // what is around them where shells inside are close
+        raise(b->raised[o], b, &field->sphere, world->surfaces && field->settings.inner > 1 ? 0 : 0.1);
         alb_shadow_receivers_at(&v, field, b->raised[o], b->count);
         memcpy(b->distances_mm[o], v.distances_mm, sizeof v.distances_mm);
         for (size_t r = 0; r < b->count; r++) { // the height of the sphere's top above the horizon, in radii

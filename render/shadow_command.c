@@ -83,8 +83,8 @@ static bool light_first(sequence *s, const alb_scene *scene, alb_error *error)
     s->small_share = alb_shadow_small_lights(&world, scene->mesh.vertices, s->stage.normals, scene->mesh.vertex_count);
     if (s->small_share > 0)
         fprintf(stderr,
-                "render: from %.0f %% of the vertices a light is less than %d degrees in half-angle: the shadows of "
-                "objects on themselves are blurred\n",
+                "render: from %.0f %% of the vertices a light is less than %d degrees in half-angle: the edges of its "
+                "shadows are blurred\n",
                 100 * s->small_share, ALB_SHADOW_SMALL_DEG);
     return alb_shadow_error(&s->verdict, &s->stage, scene, scene->seed, error);
 }
@@ -126,7 +126,8 @@ static void print_choice(const sequence *s)
 
 static bool report(const sequence *s, bool as_json, alb_error *error)
 {
-    const alb_shadow_settings *settings = &s->stage.settings;
+    const alb_shadow_stage *stage = &s->stage;
+    const alb_shadow_settings *settings = stage->occluder_count ? &stage->fields[0].settings : &stage->settings;
     if (!as_json) {
         printf(
             "%s: %d frames, %zu vertices, %zu occluders, stated error %.2g %% (within %.2g %%), %.1f ms sampling and "

@@ -310,7 +310,8 @@ bool alb_shadow_emitter_place(alb_shadow_emitter *emitter, const alb_vector *ver
 {
     const size_t bytes = emitter->vertex_count * sizeof *vertices;
     place_samples(emitter, vertices, sphere);
-    if (!memcmp(emitter->vertices, vertices, bytes))
+    emitter->moved = memcmp(emitter->vertices, vertices, bytes) != 0;
+    if (!emitter->moved)
         return true;
     memcpy(emitter->vertices, vertices, bytes);
     if (!alb_tracer_move(&emitter->tracer, vertices, emitter->vertex_count, error))

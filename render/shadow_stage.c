@@ -3,6 +3,7 @@
 #include "render/shadow_stage.h"
 #include "base/memory.h"
 #include "base/progress.h"
+#include "render/shadow_cut.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,59 +14,46 @@ static bool emits(const alb_scene *scene, size_t face)
     return e[0] + e[1] + e[2] > 0;
 }
 
-// The faces of one object, and what they send.
-static bool cut_out(alb_mesh *mesh, float (**radiance)[3], const alb_scene *scene, const alb_object *object,
-                    alb_error *error)
-{
-    const alb_mesh *all = &scene->mesh;
-    bool ok = (*radiance = alb_allocate(all->face_count, sizeof **radiance, error)) != NULL;
-    for (size_t v = 0; ok && v < object->vertex_count; v++)
-        ok = alb_mesh_add_vertex(mesh, all->vertices[object->first_vertex + v], error);
-    for (size_t f = 0; ok && f < all->face_count; f++) {
-        if (!alb_object_owns(object, all->faces[f][0]))
-            continue;
-        const size_t count = mesh->face_count;
-        uint32_t at[3];
-        for (int k = 0; k < 3; k++)
-            at[k] = all->faces[f][k] - (uint32_t)object->first_vertex;
-        ok = alb_mesh_add_face(mesh, at[0], at[1], at[2], 0, error);
-        for (int c = 0; c < 3 && mesh->face_count > count; c++)
-            (*radiance)[count][c] = (float)(scene->surfaces[all->groups[f]].exitance[c] / M_PI);
-    }
-    return ok;
-}
-
 // Of a light's field samples make no use but of its sphere.
 static const alb_shadow_settings sphere_alone = {.order = 2, .cells = 1, .pixels = 8, .distance = 1.1, .outer = 1};
 
-// Lights with a surface look along lines of sight: the finer the samples the better.
-static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o, bool light, bool fine,
+static bool add_light(alb_shadow_stage *stage, size_t index, const alb_mesh *mesh, const float (*radiance)[3],
+                      alb_error *error)
+{
+    const alb_shadow_settings *settings = stage->paper ? &alb_shadow_light_settings : &sphere_alone;
+    if (!alb_shadow_field_create(&stage->fields[index], settings, mesh, radiance, stage->names[index], error))
+        return false;
+    stage->light_count++;
+    return stage->paper || alb_shadow_emitter_create(&stage->emitters[stage->light_count - 1], mesh, radiance, error);
+}
+
+static bool add_occluder(alb_shadow_stage *stage, size_t index, const alb_mesh *mesh, int order, alb_error *error)
+{
+    alb_shadow_settings settings = stage->settings;
+    settings.order = order;
+    if (!alb_shadow_field_create(&stage->fields[index], &settings, mesh, NULL, stage->names[index], error))
+        return false;
+    stage->occluder_count++;
+    return !settings.probes ||
+           alb_shadow_surface_create(&stage->surfaces[index], mesh, stage->normals + stage->first_vertices[index],
+                                     (size_t)settings.probes, error);
+}
+
+// An object of which no face is left (all stood there twice, say) is not there.
+static bool add_field(alb_shadow_stage *stage, const alb_scene *scene, size_t o, bool light, int order,
                       alb_error *error)
 {
     const size_t index = stage->occluder_count + stage->light_count;
-    alb_shadow_settings settings = stage->settings;
     alb_mesh mesh = {0};
     float(*radiance)[3] = NULL;
-    if (light)
-        settings = stage->paper ? alb_shadow_light_settings : sphere_alone;
-    else if (fine)
-        settings.order = ALB_SH_ORDER_MAX;
     stage->objects[index] = o;
     stage->first_vertices[index] = scene->objects[o].first_vertex;
     snprintf(stage->names[index], sizeof *stage->names, "object %zu", o);
     stage->of_body[index] = scene->objects[o].rigid && !light;
-    bool ok =
-        cut_out(&mesh, &radiance, scene, &scene->objects[o], error) &&
-        alb_shadow_field_create(&stage->fields[index], &settings, &mesh, light ? (const float(*)[3])radiance : NULL,
-                                stage->names[index], error) &&
-        (light || !settings.probes ||
-         alb_shadow_surface_create(&stage->surfaces[index], &mesh, stage->normals + scene->objects[o].first_vertex,
-                                   (size_t)settings.probes, error));
-    if (ok && light && !stage->paper)
-        ok = alb_shadow_emitter_create(&stage->emitters[stage->light_count], &mesh, (const float(*)[3])radiance, error);
-    if (!ok)
-        alb_shadow_field_free(&stage->fields[index]);
-    *(light ? &stage->light_count : &stage->occluder_count) += ok;
+    bool ok = alb_shadow_cut_one(&mesh, &radiance, scene, &scene->objects[o], error);
+    if (ok && mesh.face_count)
+        ok = light ? add_light(stage, index, &mesh, (const float(*)[3])radiance, error)
+                   : add_occluder(stage, index, &mesh, order, error);
     free(radiance);
     alb_mesh_free(&mesh);
     return ok;
@@ -97,6 +85,9 @@ static void free_fields(alb_shadow_stage *stage)
     free(stage->irradiance);
     for (size_t i = 0; stage->surfaces && i < stage->occluder_count; i++)
         alb_shadow_surface_free(&stage->surfaces[i]);
+    for (size_t i = 0; stage->glimpses && i < stage->occluder_count; i++)
+        alb_shadow_glimpse_free(&stage->glimpses[i]);
+    free(stage->glimpses);
     free(stage->surfaces);
     free(stage->first_vertices);
     free(stage->of_body);
@@ -155,6 +146,16 @@ static bool create_transport(alb_shadow_stage *stage, const alb_scene *scene, co
     return ok;
 }
 
+static bool create_glimpses(alb_shadow_stage *stage, alb_error *error)
+{
+    if (!stage->emitters || !stage->light_count || !stage->settings.probes)
+        return true;
+    bool ok = (stage->glimpses = alb_allocate(stage->occluder_count, sizeof *stage->glimpses, error));
+    for (size_t o = 0; ok && o < stage->occluder_count; o++)
+        ok = alb_shadow_glimpse_create(&stage->glimpses[o], &stage->surfaces[o], stage->light_count, error);
+    return ok;
+}
+
 static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
 {
     const alb_mesh *mesh = &scene->mesh;
@@ -176,11 +177,13 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
         set_normals(stage->normals, mesh);
     for (size_t o = 0; ok && o < n; o++)
         any |= shines[o];
+    // lights with a surface are seen along lines: the finer the samples the better
+    const int order = any && !stage->paper ? ALB_SH_ORDER_MAX : stage->settings.order;
     for (int light = 0; light < 2; light++) // occluders first
         for (size_t o = 0; ok && o < n; o++)
             if (shines[o] == (light == 1) && (light || !scene->objects[o].receives_only))
-                ok = add_field(stage, scene, o, light, any && !stage->paper, error);
-    ok = ok && create_transport(stage, scene, shines, error);
+                ok = add_field(stage, scene, o, light, order, error);
+    ok = ok && create_glimpses(stage, error) && create_transport(stage, scene, shines, error);
     free(shines);
     if (!ok)
         return false;
@@ -188,7 +191,6 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
     memcpy(stage->groups, mesh->groups, mesh->face_count * sizeof *stage->groups);
     stage->face_count = mesh->face_count;
     stage->vertex_count = mesh->vertex_count;
-    const int order = stage->occluder_count ? stage->fields[0].settings.order : stage->settings.order;
     if (stage->laws_order == order)
         return true;
     alb_shadow_laws_free(&stage->laws);
@@ -238,7 +240,39 @@ alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage)
                               .transport = stage->transport.row_count ? &stage->transport : NULL,
                               .of_body = stage->of_body,
                               .surfaces = stage->settings.probes ? stage->surfaces : NULL,
+                              .glimpses = stage->settings.probes ? stage->glimpses : NULL,
                               .first_vertices = stage->first_vertices};
+}
+
+static bool place_lights(alb_shadow_stage *stage, const alb_vector *vertices, alb_error *error)
+{
+    bool ok = true;
+    for (size_t j = 0; ok && stage->emitters && j < stage->light_count; j++) {
+        const size_t light = stage->occluder_count + j;
+        ok = alb_shadow_emitter_place(&stage->emitters[j], vertices + stage->first_vertices[light],
+                                      &stage->fields[light].sphere, error);
+    }
+    return ok;
+}
+
+// After the lights are placed.
+static bool sample_surfaces(alb_shadow_stage *stage, const alb_vector *vertices, alb_error *error)
+{
+    for (size_t i = 0; stage->settings.probes && i < stage->occluder_count; i++) {
+        alb_shadow_surface *surface = &stage->surfaces[i];
+        const size_t first = stage->first_vertices[i];
+        const alb_vector *here = vertices + first, *normals = stage->normals + first;
+        if (!stage->light_count && stage->of_body[i]) // skies have the transport of what is rigid
+            continue;
+        const bool moved =
+            !surface->sampled || memcmp(here, surface->mesh.vertices, surface->mesh.vertex_count * sizeof *here) != 0;
+        if (!alb_shadow_surface_sample(surface, here, normals, error))
+            return false;
+        for (size_t j = 0; stage->glimpses && j < stage->light_count; j++)
+            if (moved || stage->emitters[j].moved)
+                alb_shadow_glimpse_take(&stage->glimpses[i], surface, normals, &stage->emitters[j], j);
+    }
+    return true;
 }
 
 bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
@@ -260,15 +294,7 @@ bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb
     for (size_t i = 0; ok && i < stage->occluder_count + stage->light_count; i++)
         ok = alb_shadow_field_sample(&stage->fields[i], mesh->vertices + scene->objects[stage->objects[i]].first_vertex,
                                      error);
-    for (size_t i = 0; ok && stage->settings.probes && i < stage->occluder_count; i++)
-        if (stage->light_count || !stage->of_body[i]) // skies have the transport of what is rigid
-            ok = alb_shadow_surface_sample(&stage->surfaces[i], mesh->vertices + stage->first_vertices[i],
-                                           stage->normals + stage->first_vertices[i], error);
-    for (size_t i = 0; ok && stage->emitters && i < stage->light_count; i++) {
-        const size_t light = stage->occluder_count + i;
-        ok = alb_shadow_emitter_place(&stage->emitters[i], mesh->vertices + stage->first_vertices[light],
-                                      &stage->fields[light].sphere, error);
-    }
+    ok = ok && place_lights(stage, mesh->vertices, error) && sample_surfaces(stage, mesh->vertices, error);
     const double sampled_s = alb_clock_s();
     if (ok) {
         const alb_shadow_world world = alb_shadow_stage_world(stage);

@@ -3,25 +3,20 @@
 // parts.
 #pragma once
 #include "render/shadow_laws.h"
+#include "render/shadow_probes.h"
 #include "render/tracer.h"
-
-enum { ALB_SHADOW_PROBE_NEIGHBOURS = 4 };
 
 typedef struct alb_shadow_surface {
     alb_mesh mesh; // faces; vertices as the probes last saw them
-    size_t probe_count;
-    uint32_t *probes; // vertices
+    alb_shadow_probes probes;
     bool sampled;
-    uint32_t (*neighbours)[ALB_SHADOW_PROBE_NEIGHBOURS]; // of each vertex: numbers of probes
-    float (*weights)[ALB_SHADOW_PROBE_NEIGHBOURS];       // sum 1
     float (*hidden)[ALB_SHADOW_VALUES]; // of each vertex: coefficients of max(0, n.d) where the object hides d
     float *seen, *axes;                 // of the probes: [value][probe], [3][probe]
     bool *buried;                       // of the probes: all they see is the object
     alb_tracer tracer;                  // the surface stays at its address
 } alb_shadow_surface;
 
-// The mesh is copied. probes: at most so many vertices become one, but at least one of each connected part; with as
-// many as vertices each sees for itself. Normals: of the vertices.
+// The mesh is copied; probes as for alb_shadow_probes_create.
 bool alb_shadow_surface_create(alb_shadow_surface *surface, const alb_mesh *mesh, const alb_vector *normals,
                                size_t probes, alb_error *error);
 void alb_shadow_surface_free(alb_shadow_surface *surface);

@@ -9,6 +9,7 @@
 #include "base/random.h"
 #include "render/sh_rotate.h"
 #include "render/sh_zonal.h"
+#include "render/shadow_cut.h"
 #include "render/tracer.h"
 #include <omp.h>
 #include <stdlib.h>
@@ -27,15 +28,10 @@ static void number_rows(alb_shadow_transport *t, const alb_scene *scene)
 
 static bool collect_casters(alb_mesh *casters, const alb_shadow_transport *t, const alb_scene *scene, alb_error *error)
 {
-    const alb_mesh *all = &scene->mesh;
-    bool ok = true;
-    for (size_t v = 0; ok && v < all->vertex_count; v++)
-        ok = alb_mesh_add_vertex(casters, all->vertices[v], error);
-    for (size_t o = 0; ok && o < scene->object_count; o++)
-        for (size_t f = 0; ok && t->of_body[o] && !scene->objects[o].receives_only && f < all->face_count; f++)
-            if (alb_object_owns(&scene->objects[o], all->faces[f][0]))
-                ok = alb_mesh_add_face(casters, all->faces[f][0], all->faces[f][1], all->faces[f][2], 0, error);
-    return ok;
+    bool chosen[ALB_OBJECTS_MAX];
+    for (size_t o = 0; o < scene->object_count; o++)
+        chosen[o] = t->of_body[o] && !scene->objects[o].receives_only;
+    return alb_shadow_cut(casters, NULL, scene, chosen, error);
 }
 
 // Three vertices that fix the body's motion: the first, the one farthest from it, the one farthest from their line.

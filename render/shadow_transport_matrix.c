@@ -15,11 +15,21 @@ typedef struct solid {
     uint16_t *materials;
     alb_patches patches;
     alb_scatter scatter;
-    double *around_mm2; // of each row: area of the faces around
-    double (*in)[3], (*out)[3];
+    double *around_mm2;                       // of each row: area of the faces around
+    double (*in)[3], (*out)[3], (*totals)[3]; // of patches; of materials: of their profiles
 } solid;
 
 static bool scatters(const alb_scene *scene, size_t face) { return scene->surfaces[scene->mesh.groups[face]].scatters; }
+
+static bool find_totals(solid *s, const alb_scene *scene, alb_error *error)
+{
+    if (!(s->totals = alb_allocate(scene->surface_count, sizeof *s->totals, error)))
+        return false;
+    for (size_t i = 0; i < scene->surface_count; i++)
+        for (int c = 0; c < 3 && scene->surfaces[i].scatters; c++)
+            s->totals[i][c] = alb_profile_total(&scene->surfaces[i].profiles[ALB_REFLECTION][c]);
+    return true;
+}
 
 static bool create_solid(solid *s, alb_shadow_transport *t, const alb_scene *scene, alb_error *error)
 {
@@ -52,7 +62,7 @@ static bool create_solid(solid *s, alb_shadow_transport *t, const alb_scene *sce
     const size_t n = s->mesh.face_count;
     return ok && (!n || ((t->matrices = alb_allocate(t->matrix_count, sizeof *t->matrices, error)) &&
                          (s->in = alb_allocate(n, sizeof *s->in, error)) &&
-                         (s->out = alb_allocate(n, sizeof *s->out, error)) &&
+                         (s->out = alb_allocate(n, sizeof *s->out, error)) && find_totals(s, scene, error) &&
                          alb_patches_create(&s->patches, &s->mesh, error) &&
                          alb_scatter_create(&s->scatter, &s->patches, s->materials, scene->surfaces, 0.005, error)));
 }
@@ -66,10 +76,11 @@ static void free_solid(solid *s)
     free(s->around_mm2);
     free(s->in);
     free(s->out);
+    free(s->totals);
 }
 
 // Coefficient i of all.
-static void add_column(alb_shadow_transport *t, solid *s, const alb_scene *scene, size_t i)
+static void add_column(alb_shadow_transport *t, solid *s, size_t i)
 {
     for (size_t p = 0; p < s->mesh.face_count; p++) {
         const uint32_t *v = s->mesh.faces[p];
@@ -80,10 +91,9 @@ static void add_column(alb_shadow_transport *t, solid *s, const alb_scene *scene
     }
     alb_scatter_apply(s->out, &s->scatter, (const double(*)[3])s->in);
     for (size_t p = 0; p < s->mesh.face_count; p++) {
-        const alb_profile *profiles = scene->surfaces[s->materials[p]].profiles[ALB_REFLECTION];
         for (int k = 0; k < 9; k++) {
             const size_t row = t->rows[s->mesh.faces[p][k / 3]];
-            const double total = alb_profile_total(&profiles[k % 3]),
+            const double total = s->totals[s->materials[p]][k % 3],
                          share = s->patches.areas_mm2[p] / s->around_mm2[row],
                          out = total > 0 ? s->out[p][k % 3] / total : 0;
             t->matrices[t->matrix_of[row]][k % 3][i] += (float)(share * (out - (double)t->vectors[row][i]));
@@ -99,7 +109,7 @@ bool alb_shadow_transport_scatter(alb_shadow_transport *t, const alb_scene *scen
         for (int c = 0; c < 3 && t->matrix_of[row] != ALB_TRANSPORT_NONE; c++)
             memcpy(t->matrices[t->matrix_of[row]][c], t->vectors[row], sizeof t->vectors[row]);
     for (size_t i = 0; ok && s.mesh.face_count && i < ALB_SH_COUNT_MAX; i++)
-        add_column(t, &s, scene, i);
+        add_column(t, &s, i);
     free_solid(&s);
     return ok;
 }

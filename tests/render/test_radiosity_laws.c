@@ -29,7 +29,7 @@ static void lights_superpose(void **state)
     alb_scene_free(&scene);
 }
 
-// Without translucency it is plain radiosity: B = E rho + rho F B, solved here row by row in double precision.
+// Without translucency it is plain radiosity: B = E rho + rho F B, solved here from its rows in double precision.
 static void opaque_scenes_are_plain_radiosity(void **state)
 {
     (void)state;
@@ -42,9 +42,9 @@ static void opaque_scenes_are_plain_radiosity(void **state)
     scene.surfaces[0] = diffuse(0.5, 0.6, 0.8), scene.surfaces[1] = diffuse(0.9, 0.1, 0.95);
     check_ok(alb_solution_create(&s, &scene, &error), &error);
     const size_t n = s.patches.count;
-    alb_rgb *b = calloc(n, sizeof *b);
+    alb_rgb *b = calloc(n, sizeof *b), *gathered = calloc(n, sizeof *gathered);
     uint32_t row[64];
-    for (int step = 0; step < 200; step++)
+    for (int step = 0; step < 400; step++) {
         for (size_t p = 0; p < n; p++) {
             double sum[3] = {0};
             alb_form_factors_row(row, &s.factors, p);
@@ -52,12 +52,18 @@ static void opaque_scenes_are_plain_radiosity(void **state)
                 for (int c = 0; c < 3 && row[q] < n; c++)
                     sum[c] += b[row[q]][c];
             for (int c = 0; c < 3; c++)
-                b[p][c] = scene.surfaces[scene.mesh.groups[p]].reflectance[c] * (s.irradiance[p][c] + sum[c] / 64);
+                gathered[p][c] = sum[c] / 64;
         }
+        alb_form_factors_share(gathered, &s.factors);
+        for (size_t p = 0; p < n; p++)
+            for (int c = 0; c < 3; c++)
+                b[p][c] = scene.surfaces[scene.mesh.groups[p]].reflectance[c] * (s.irradiance[p][c] + gathered[p][c]);
+    }
     for (size_t p = 0; p < n; p++)
         for (int c = 0; c < 3; c++)
             check_relative(s.radiosity[p][c], b[p][c], 1e-4); // the residual, 1e-6 of |b|, where it is dark
     free(b);
+    free(gathered);
     alb_solution_free(&s);
     alb_scene_free(&scene);
 }

@@ -3,6 +3,7 @@
 #include "base/random.h"
 #include "check.h"
 #include "render/shadow_light.h"
+#include "render/shadow_rays.h"
 #include "render/shape.h"
 #include "scenes/shapes.h"
 #include <omp.h>
@@ -264,7 +265,7 @@ static void light_inside_the_occluders_sphere(void **state)
     make_sheet(&mesh, (alb_vector){0, 0, 10}, 12);
     stage *s = new_stage(&mesh, NULL);
     irradiance(open, s, here, up);
-    add_ball(s, (alb_vector){0, 0, 14}, 2); // within the light's sphere, behind
+    add_ball(s, (alb_vector){0, 0, 16}, 5.5); // within the light's sphere, behind
     irradiance(found, s, here, up);
     check_relative((double)found[0], (double)open[0], 1e-6);
     add_ball(s, (alb_vector){0, 0, 5}, 2); // within it, before
@@ -360,6 +361,109 @@ static void laws(void **state)
     assert_true(apart > 20);
 }
 
+// A wall on a floor, one object: its probes see for the floor around them what the wall leaves of the light.
+static void object_shades_itself(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_mesh mesh = {0}, lamp = {0};
+    const alb_vector at = {8, 0, 8};
+    const size_t first = 0;
+    check_ok(
+        shape_sheet(&mesh, (alb_vector){-5, -5, 0}, (alb_vector){10, 0, 0}, (alb_vector){0, 10, 0}, 24, 24, 0, &error),
+        &error);
+    const size_t floor = mesh.vertex_count;
+    check_ok(shape_sheet(&mesh, (alb_vector){1, -3, 0}, (alb_vector){0, 6, 0}, (alb_vector){0, 0, 3}, 12, 6, 0, &error),
+             &error);
+    make_sheet(&lamp, at, 2);
+    stage *s = new_stage(&lamp, NULL);
+    add_occluder(s, &mesh, ALB_SH_ORDER_MAX);
+    static alb_vector normals[2000];
+    static float found[2000][3];
+    for (size_t v = 0; v < mesh.vertex_count; v++)
+        normals[v] = v < floor ? (alb_vector){0, 0, 1} : (alb_vector){1, 0, 0};
+    alb_shadow_surface surface;
+    alb_shadow_glimpse glimpse;
+    alb_tracer tracer;
+    check_ok(alb_shadow_surface_create(&surface, &mesh, normals, 500, &error), &error);
+    check_ok(alb_shadow_surface_sample(&surface, mesh.vertices, normals, &error), &error);
+    check_ok(alb_shadow_glimpse_create(&glimpse, &surface, 1, &error), &error);
+    alb_shadow_glimpse_take(&glimpse, &surface, normals, &s->emitter, 0);
+    check_ok(alb_tracer_create(&tracer, &mesh, &error), &error);
+    s->world.surfaces = &surface, s->world.glimpses = &glimpse, s->world.first_vertices = &first;
+    check_ok(alb_shadow_irradiance(found, &s->world, mesh.vertices, normals, floor, NULL, &error), &error);
+    double sum = 0, lost = 0, mean = 0;
+    for (size_t v = 0; v < floor; v++) {
+        const alb_vector p = alb_add(mesh.vertices[v], (alb_vector){0, 0, 1e-4});
+        if (fabs(p.x - 1) < 0.2)
+            continue; // in the wall
+        double truth = 0, open = 0;
+        for (int i = 0; i < 400; i++) {
+            const alb_vector y = {at.x + (i % 20 + 0.5) / 5 - 2, at.y + (i / 20 + 0.5) / 5 - 2, at.z},
+                             to = alb_sub(y, p);
+            const double e = to.z * to.z / pow(alb_dot(to, to), 2) * 16 / 400;
+            open += e;
+            truth += alb_tracer_blocked(&tracer, p, y) ? 0 : e;
+        }
+        sum += pow((double)found[v][0] - truth, 2);
+        lost += pow(open - truth, 2);
+        mean += truth;
+    }
+    print_message("a wall on its floor: rms %.3f of the mean, its shadow %.3f\n", sqrt(sum * (double)floor) / mean,
+                  sqrt(lost * (double)floor) / mean);
+    check_below(sqrt(sum * (double)floor) / mean, 0.05); // every second vertex is a probe
+    check_below(0.15, sqrt(lost * (double)floor) / mean);
+    alb_shadow_glimpse_free(&glimpse);
+    alb_shadow_surface_free(&surface);
+    alb_tracer_free(&tracer);
+    free_stage(s);
+    alb_mesh_free(&mesh);
+    alb_mesh_free(&lamp);
+}
+
+// The other oracle: rays aimed at a light have no bias, near and far, and far less noise than those that find it by
+// chance.
+static void aimed_rays(void **state)
+{
+    (void)state;
+    enum { TIMES = 400 };
+    alb_error error = {0};
+    alb_mesh mesh = {0};
+    alb_tracer tracer;
+    alb_shadow_lamps lamps;
+    static alb_vector points[TIMES], normals[TIMES];
+    static float found[2][TIMES][3];
+    check_ok(alb_shape_sphere(&mesh, &(alb_sphere){{0, 0, 0}, 1, 5, false}, &error), &error);
+    float(*radiance)[3] = calloc(mesh.face_count, sizeof *radiance);
+    for (size_t f = 0; f < mesh.face_count; f++)
+        radiance[f][1] = 1;
+    check_ok(alb_tracer_create(&tracer, &mesh, &error), &error);
+    check_ok(alb_shadow_lamps_create(&lamps, &mesh, (const float(*)[3])radiance, &error), &error);
+    for (double x = 1.05; x < 40; x *= 2.5) {
+        double mean[2] = {0}, square[2] = {0};
+        for (int n = 0; n < TIMES; n++)
+            points[n] = (alb_vector){0, 0, -x}, normals[n] = (alb_vector){0, 0.6, 0.8};
+        alb_shadow_cast(found[0], &tracer, (const float(*)[3])radiance, NULL, 0, points, normals, TIMES, 8, 1e-4, 5);
+        alb_shadow_cast_aimed(found[1], &tracer, &lamps, NULL, 0, points, normals, TIMES, 8, 1e-4, 5);
+        for (int k = 0; k < 2; k++)
+            for (int n = 0; n < TIMES; n++) {
+                mean[k] += (double)found[k][n][1] / TIMES;
+                square[k] += pow((double)found[k][n][1], 2) / TIMES;
+            }
+        const double aimed = sqrt((square[1] - mean[1] * mean[1]) / TIMES),
+                     chance = sqrt((square[0] - mean[0] * mean[0]) / TIMES);
+        print_message("%.2f radii: %.5f +- %.5f aimed, %.5f +- %.5f by chance\n", x, mean[1], aimed, mean[0], chance);
+        check_near(mean[1], mean[0], 4 * hypot(aimed, chance));
+        if (x > 2) // all of it above the horizon; the mesh is .1 % smaller than the ball
+            check_near(mean[1], 0.8 * M_PI / (x * x), 4 * aimed + 3e-3 / (x * x));
+        check_below(aimed, (x > 5 ? 0.2 : 1.3) * chance); // close by both kinds find it
+    }
+    alb_shadow_lamps_free(&lamps);
+    alb_tracer_free(&tracer);
+    alb_mesh_free(&mesh);
+    free(radiance);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -369,7 +473,9 @@ int main(void)
         cmocka_unit_test(light_hides_itself),
         cmocka_unit_test(light_inside_the_occluders_sphere),
         cmocka_unit_test(receiver_crosses_the_bounding_sphere),
+        cmocka_unit_test(object_shades_itself),
         cmocka_unit_test(laws),
+        cmocka_unit_test(aimed_rays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,6 +6,8 @@
 #include "render/shadow_advisor.h"
 #include "render/shadow_command.h"
 #include "scenes/shadow_scenes.h"
+#include <dirent.h>
+#include <unistd.h>
 
 #define CAMERA                                                                                                         \
     "\"camera\":{\"position_mm\":[0,-200,120],\"look_at_mm\":[0,0,0],\"up\":[0,0,1],\"vertical_field_deg\":40,"        \
@@ -18,7 +20,25 @@
 #define BALL "{\"mesh\":\"test_shadow_#.obj\",\"material\":\"m\"}"
 #define RIGID "{\"mesh\":\"test_shadow_#.obj\",\"material\":\"m\",\"rigid\":true}"
 
-static void write(const char *path, const char *text)
+static int enter_folder(void **state)
+{
+    static char folder[] = "/tmp/alabaster_shadow_XXXXXX";
+    *state = mkdtemp(folder);
+    return !*state || chdir(*state) != 0;
+}
+
+static int leave_folder(void **state)
+{
+    DIR *folder = opendir(".");
+    for (const struct dirent *file; folder && (file = readdir(folder));)
+        if (file->d_name[0] != '.' || strlen(file->d_name) > 2)
+            remove(file->d_name);
+    if (folder)
+        closedir(folder);
+    return chdir("/") != 0 || rmdir(*state) != 0;
+}
+
+static void write_text(const char *path, const char *text)
 {
     alb_error error = {0};
     check_ok(alb_file_write(path, text, strlen(text), &error), &error);
@@ -35,7 +55,7 @@ static void write_frames(void)
                  "v -20 -20 %d\nv 20 -20 %d\nv 20 20 %d\nv -20 20 %d\nv -20 -20 %d\nv 20 -20 %d\nv 20 20 %d\nv -20 20 "
                  "%d\nf 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n",
                  low, low, low, low, high, high, high, high);
-        write(name, text);
+        write_text(name, text);
     }
 }
 
@@ -44,7 +64,7 @@ static void write_scene(const char *objects, const char *lights, int frames)
     char text[2048];
     snprintf(text, sizeof text, "{\"format\":1,\"frames\":%d,\"objects\":[%s],%s" MATERIALS "," CAMERA "}", frames,
              objects, lights);
-    write("test_shadow.json", text);
+    write_text("test_shadow.json", text);
 }
 
 static bool render(const char *picture, const char *mesh, const char *percent, alb_error *error)
@@ -230,5 +250,5 @@ int main(void)
         cmocka_unit_test(refuses_what_is_wrong),    cmocka_unit_test(renders_a_sequence),
         cmocka_unit_test(says_what_error_it_makes), cmocka_unit_test(four_scenes_have_their_counts),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, enter_folder, leave_folder);
 }

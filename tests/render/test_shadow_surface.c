@@ -56,7 +56,7 @@ static void floor_beside_a_wall(void **state)
         alb_shadow_surface surface;
         sample(&surface, &mesh, few ? 30 : mesh.vertex_count);
         if (!few)
-            assert_int_equal(surface.probe_count, mesh.vertex_count);
+            assert_int_equal(surface.probes.count, mesh.vertex_count);
         for (size_t v = 0; v < floor; v++) {
             const double x = mesh.vertices[v].x, truth = 0.5 * (1 - x / hypot(x, 5));
             // 32 rays along an edge of the hidden part: half a ray's share times the root of those on it; with few
@@ -80,7 +80,7 @@ static void parts_have_probes_of_their_own(void **state)
     check_ok(alb_shape_sphere(&ball, &(alb_sphere){{0}, 1, 3, false}, &error), &error);
     alb_shadow_surface surface;
     sample(&surface, &ball, 50);
-    assert_int_equal(surface.probe_count, 50);
+    assert_int_equal(surface.probes.count, 50);
     for (size_t v = 0; v < ball.vertex_count; v++)
         check_near(share(&surface, v), 0, 1e-12);
     alb_shadow_surface_free(&surface);
@@ -88,14 +88,14 @@ static void parts_have_probes_of_their_own(void **state)
         check_ok(alb_mesh_append(&two, &ball, 1 + k, (alb_vector){5 * k, 0, 0}, &error), &error);
     for (size_t probes = 1; probes < 200; probes += 60) {
         sample(&surface, &two, probes);
-        assert_int_equal(surface.probe_count, probes < 2 ? 2 : probes);
+        assert_int_equal(surface.probes.count, probes < 2 ? 2 : probes);
         for (size_t v = 0; v < two.vertex_count; v++) {
             double sum = 0;
             for (int k = 0; k < ALB_SHADOW_PROBE_NEIGHBOURS; k++) {
-                const size_t probe = surface.probes[surface.neighbours[v][k]];
-                assert_true(surface.weights[v][k] >= 0);
-                sum += (double)surface.weights[v][k];
-                if (surface.weights[v][k] > 0)
+                const size_t probe = surface.probes.vertices[surface.probes.neighbours[v][k]];
+                assert_true(surface.probes.weights[v][k] >= 0);
+                sum += (double)surface.probes.weights[v][k];
+                if (surface.probes.weights[v][k] > 0)
                     assert_true((probe < ball.vertex_count) == (v < ball.vertex_count));
             }
             check_near(sum, 1, 1e-6);
@@ -119,7 +119,7 @@ static void buried_probes_are_left_out(void **state)
     alb_shadow_surface surface;
     sample(&surface, &two, 300);
     size_t buried = 0;
-    for (size_t p = 0; p < surface.probe_count; p++)
+    for (size_t p = 0; p < surface.probes.count; p++)
         buried += surface.buried[p];
     assert_in_range(buried, 20, 150);
     for (size_t v = 0; v < ball.vertex_count; v++)

@@ -14,21 +14,21 @@ static bool in_light(const alb_shadow_stage *stage, const alb_scene *scene, size
 
 bool shadow_truth_find(shadow_truth *t, const alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
 {
-    alb_mesh casters = {0};
+    t->casters = (alb_mesh){0};
     bool ok = (t->radiance = calloc(scene->mesh.face_count, sizeof *t->radiance)) != NULL;
     for (size_t v = 0; ok && v < scene->mesh.vertex_count; v++)
-        ok = alb_mesh_add_vertex(&casters, scene->mesh.vertices[v], error);
+        ok = alb_mesh_add_vertex(&t->casters, scene->mesh.vertices[v], error);
     for (size_t f = 0; ok && f < scene->mesh.face_count; f++) {
         const uint32_t *v = scene->mesh.faces[f];
         if (v[0] < scene->objects[0].vertex_count) // the ground casts nothing
             continue;
-        const size_t count = casters.face_count;
-        ok = alb_mesh_add_face(&casters, v[0], v[1], v[2], 0, error);
-        for (int c = 0; c < 3 && casters.face_count > count; c++)
+        const size_t count = t->casters.face_count;
+        ok = alb_mesh_add_face(&t->casters, v[0], v[1], v[2], 0, error);
+        for (int c = 0; c < 3 && t->casters.face_count > count; c++)
             t->radiance[count][c] = (float)(scene->surfaces[scene->mesh.groups[f]].exitance[c] / M_PI);
     }
-    ok = ok && alb_tracer_create(&t->tracer, &casters, error);
-    alb_mesh_free(&casters);
+    ok = ok && alb_tracer_create(&t->tracer, &t->casters, error) &&
+         alb_shadow_lamps_create(&t->lamps, &t->casters, (const float(*)[3])t->radiance, error);
     alb_random random = alb_random_at(3, 1, 0);
     for (t->count = 0; ok && t->count < SHADOW_TRUTH_SAMPLES;) {
         const size_t v = (size_t)(alb_random_uniform(&random) * (double)scene->mesh.vertex_count);
@@ -40,14 +40,16 @@ bool shadow_truth_find(shadow_truth *t, const alb_shadow_stage *stage, const alb
         t->normals[t->count++] = stage->normals[v];
     }
     for (int half = 0; ok && half < 2; half++)
-        alb_shadow_cast(t->halves[half], &t->tracer, (const float(*)[3])t->radiance, scene->lights, scene->light_count,
-                        t->points, t->normals, t->count, 45, 256 * t->tracer.slack_mm, 1 + (uint64_t)half);
+        alb_shadow_cast_aimed(t->halves[half], &t->tracer, &t->lamps, scene->lights, scene->light_count, t->points,
+                              t->normals, t->count, 45, 256 * t->tracer.slack_mm, 1 + (uint64_t)half);
     return ok;
 }
 
 void shadow_truth_free(shadow_truth *t)
 {
+    alb_shadow_lamps_free(&t->lamps);
     alb_tracer_free(&t->tracer);
+    alb_mesh_free(&t->casters);
     free(t->radiance);
 }
 

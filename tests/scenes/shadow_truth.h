@@ -1,4 +1,5 @@
-// What a stage's irradiance should be at vertices drawn at random, by two independent halves of 2025 rays each.
+// What a stage's irradiance should be at vertices drawn at random, by two independent halves of 2025 rays each,
+// and as many aimed at lights with a surface.
 #pragma once
 #include "render/scene.h"
 #include "render/shadow_rays.h"
@@ -10,8 +11,10 @@ typedef struct shadow_truth {
     size_t count, vertices[SHADOW_TRUTH_SAMPLES];
     alb_vector points[SHADOW_TRUTH_SAMPLES], normals[SHADOW_TRUTH_SAMPLES];
     float halves[2][SHADOW_TRUTH_SAMPLES][3];
+    alb_mesh casters;
     alb_tracer tracer;
     float (*radiance)[3];
+    alb_shadow_lamps lamps;
 } shadow_truth;
 
 // Vertices that do not shine and do not lie inside anything. The first object, the ground, casts nothing.
