@@ -11,8 +11,8 @@ enum { GROUPS = ALB_SHADOW_EMITTER_GROUPS };
 bool alb_shadow_glimpse_create(alb_shadow_glimpse *glimpse, const alb_shadow_surface *surface, size_t light_count,
                                alb_error *error)
 {
-    *glimpse = (alb_shadow_glimpse){.probe_count = surface->probe_count, .light_count = light_count};
-    glimpse->shares = alb_allocate(light_count * surface->probe_count * GROUPS, sizeof *glimpse->shares, error);
+    *glimpse = (alb_shadow_glimpse){.probe_count = surface->probes.count, .light_count = light_count};
+    glimpse->shares = alb_allocate(light_count * surface->probes.count * GROUPS, sizeof *glimpse->shares, error);
     return glimpse->shares != NULL;
 }
 
@@ -24,7 +24,7 @@ void alb_shadow_glimpse_free(alb_shadow_glimpse *glimpse)
 
 static bool hides_itself(const alb_shadow_surface *surface)
 {
-    for (size_t i = 0; i < ALB_SHADOW_VALUES * surface->probe_count; i++)
+    for (size_t i = 0; i < ALB_SHADOW_VALUES * surface->probes.count; i++)
         if (surface->seen[i] != 0)
             return true;
     return false;
@@ -33,7 +33,7 @@ static bool hides_itself(const alb_shadow_surface *surface)
 static void look(float (*shares)[2], const alb_shadow_surface *surface, size_t probe, alb_vector normal,
                  const alb_shadow_emitter *emitter, bool hides)
 {
-    const alb_vector at = surface->mesh.vertices[surface->probes[probe]],
+    const alb_vector at = surface->mesh.vertices[surface->probes.vertices[probe]],
                      from = alb_add(at, alb_times(256 * surface->tracer.slack_mm, normal));
     for (size_t g = 0; g < emitter->group_count; g++) {
         const alb_vector to = emitter->groups[g].centre_mm;
@@ -50,7 +50,7 @@ void alb_shadow_glimpse_take(alb_shadow_glimpse *glimpse, const alb_shadow_surfa
     const bool hides = hides_itself(surface);
 #pragma omp parallel for schedule(dynamic, 8)
     for (size_t p = 0; p < glimpse->probe_count; p++)
-        look(shares + p * GROUPS, surface, p, normals[surface->probes[p]], emitter, hides);
+        look(shares + p * GROUPS, surface, p, normals[surface->probes.vertices[p]], emitter, hides);
 }
 
 float alb_shadow_glimpse_at(const alb_shadow_glimpse *glimpse, const alb_shadow_surface *surface, size_t light,
@@ -59,7 +59,8 @@ float alb_shadow_glimpse_at(const alb_shadow_glimpse *glimpse, const alb_shadow_
     const float(*shares)[2] = (const float(*)[2])glimpse->shares + light * glimpse->probe_count * GROUPS + group;
     float all = 0, seen = 0;
     for (int k = 0; k < ALB_SHADOW_PROBE_NEIGHBOURS; k++) {
-        const float weight = surface->weights[vertex][k], *share = shares[surface->neighbours[vertex][k] * GROUPS];
+        const float weight = surface->probes.weights[vertex][k],
+                    *share = shares[surface->probes.neighbours[vertex][k] * GROUPS];
         all += weight * share[0];
         seen += weight * share[1];
     }
