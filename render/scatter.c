@@ -22,6 +22,7 @@
 #include "render/scatter_product.h"
 #include "render/scatter_rule.h"
 #include "render/scatter_sample.h"
+#include "render/scatter_weights.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -44,6 +45,7 @@ struct alb_scatter_parts {
     const uint16_t *materials;
     double (*totals)[3]; // of each kernel's profiles, as they are
     bool rows_known;     // the row sums are no estimate
+    alb_weights weights; // empty: products look the profiles up
 };
 
 static double radius_of(const alb_patches *patches, uint32_t patch)
@@ -260,6 +262,7 @@ void alb_scatter_free(alb_scatter *scatter)
         free(p->self);
         free_paths(p);
         alb_links_free(&p->links);
+        alb_weights_free(&p->weights);
         alb_forest_free(&p->forest);
         free(p);
     }
@@ -370,6 +373,7 @@ bool alb_scatter_rewrite_tables(alb_scatter *scatter, const alb_surface *surface
     alb_scatter_parts *p = scatter->parts;
     if (!check_surfaces(scatter, surfaces, error))
         return false;
+    alb_weights_free(&p->weights);
     for (size_t k = 0; k < p->kernel_count; k++)
         alb_scatter_kernel_write(&p->kernels[k], surfaces[p->kernels[k].surface].profiles[p->kernels[k].side]);
     alb_product_write_pairs(&p->links, p->kernels);
@@ -403,9 +407,31 @@ void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const doubl
             if (even)
                 even[j][c] = scatter->local[j][c];
         }
+    if (p->weights.blocks) {
+        alb_weights_add(out, &p->weights, &p->forest, irradiance);
+        return;
+    }
     alb_forest_gather(&p->forest, irradiance);
     alb_product_add(out, even, &p->links, &p->forest, p->kernels, both_sides);
     p->rows_known = true;
+}
+
+bool alb_scatter_keep_weights(alb_scatter *scatter, double error_wanted, double *error_percent, alb_error *error)
+{
+    alb_scatter_parts *p = scatter->parts;
+    const double(*sums)[3] = (const double(*)[3])scatter->row_sums, (*local)[3] = (const double(*)[3])scatter->local;
+    alb_weights made;
+    alb_scatter_sum_rows(scatter);
+    if (!alb_weights_create(&made, &p->links, &p->forest, p->kernels, sums, local, error_wanted, error))
+        return false;
+    if (error_percent && !alb_weights_error(error_percent, &made, &p->links, &p->forest, p->kernels, local,
+                                            scatter->patch_count, error)) {
+        alb_weights_free(&made);
+        return false;
+    }
+    alb_weights_free(&p->weights);
+    p->weights = made;
+    return true;
 }
 
 void alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3])
@@ -451,7 +477,8 @@ size_t alb_scatter_bytes(const alb_scatter *scatter)
     size_t bytes = 3 * scatter->patch_count * sizeof *scatter->local + scatter->body_count * sizeof *scatter->bodies;
     if (!p)
         return bytes;
-    bytes += alb_forest_bytes(&p->forest) + p->forest.leaf_count * sizeof *p->self;
+    bytes += alb_weights_bytes(&p->weights, &p->forest) + alb_forest_bytes(&p->forest) +
+             p->forest.leaf_count * sizeof *p->self;
     for (size_t k = 0; k < p->kernel_count; k++)
         bytes += alb_scatter_kernel_bytes(&p->kernels[k]);
     for (size_t b = 0; b < p->links.block_count; b++)
