@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double mode_error = 0.05;
+static const double mode_error = 0.02;
 
 // The rows of one cluster.
 typedef struct rows {
