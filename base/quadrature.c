@@ -5,6 +5,7 @@
 #include "base/quadrature.h"
 #include <math.h>
 #include <stdbool.h>
+#include <string.h>
 
 // P_n(x) and, in `before`, P_(n-1)(x).
 static double legendre(double *before, int n, double x)
@@ -55,9 +56,32 @@ static void stretch(double *node, double *weight, int count, double from, double
     }
 }
 
+// Gauss's nodes once they were asked for. Each count is filled by the first thread that comes; those that come before
+// it is done find the same ones for themselves.
+enum { COUNT_MAX = 64, EMPTY = 0, FILLING, FILLED };
+
+static void find_gauss(double *node, double *weight, int count)
+{
+    static double nodes[COUNT_MAX + 1][COUNT_MAX], weights[COUNT_MAX + 1][COUNT_MAX];
+    static int states[COUNT_MAX + 1];
+    const size_t size = (size_t)count * sizeof *node;
+    int empty = EMPTY;
+    if (__atomic_load_n(&states[count], __ATOMIC_ACQUIRE) == FILLED) {
+        memcpy(node, nodes[count], size);
+        memcpy(weight, weights[count], size);
+        return;
+    }
+    find_roots(node, weight, count, false);
+    if (__atomic_compare_exchange_n(&states[count], &empty, FILLING, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+        memcpy(nodes[count], node, size);
+        memcpy(weights[count], weight, size);
+        __atomic_store_n(&states[count], FILLED, __ATOMIC_RELEASE);
+    }
+}
+
 void alb_quadrature_gauss(double *node, double *weight, int count, double from, double to)
 {
-    find_roots(node, weight, count, false);
+    find_gauss(node, weight, count);
     stretch(node, weight, count, from, to);
 }
 

@@ -1,6 +1,7 @@
 // F_kj, the share of the flux leaving k that arrives at j, by R cosine-weighted rays from every patch:
 //     F_kj = (number of rays of k that hit j) / R
-// (render/form_factor_cast.c: their pattern; render/form_factor_rows.c: how they are kept and multiplied.)
+// (render/form_factor_cast.c: their pattern; render/form_factor_rows.c: how they are kept and multiplied;
+// render/form_factor_share.c: what neighbours have in common.)
 // A row of F only ever integrates a bounded function over the hemisphere, which is why a few hundred equal weights do
 // for any number of patches. The rows hold exactly (they sum to 1 with the sky); reciprocity A_k F_kj = A_j F_jk holds
 // only statistically. Never symmetrised or normalised: that raises the error. Exact factors (form_factor_exact.h) for
@@ -11,6 +12,7 @@
 #include "base/memory.h"
 #include "base/progress.h"
 #include "render/form_factor_cast.h"
+#include <math.h>
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,6 +35,22 @@ bool alb_form_factors_sees_sky(const alb_form_factors *factors, size_t patch, in
 {
     uint64_t bit;
     return factors->sky_mask && (*sky_word(factors, patch, (size_t)q, &bit) & bit);
+}
+
+// Mean over the patch's rays of one over their length, from every fourth of them; INFINITY for one that sees a back,
+// nor is known how far, or is buried.
+static float nearness_per_mm(const alb_form_factors *factors, const uint32_t *hits, const alb_patches *patches,
+                             size_t patch)
+{
+    const int rays = alb_form_factors_rays(factors, patch);
+    double sum = 0;
+    int count = 0;
+    if (alb_patch_buried(patches, patch) || factors->back_shares[patch] > 0)
+        return INFINITY;
+    for (int q = 0; q < rays; q += 4, count++)
+        if (hits[q] < factors->patch_count)
+            sum += 1 / fmax(alb_length(alb_sub(patches->centroids[hits[q]], patches->centroids[patch])), 1e-300);
+    return (float)(sum / count);
 }
 
 // Counts what a patch's rays meet beside patches.
@@ -71,6 +89,7 @@ typedef struct source {
     const uint32_t *hits;
     const alb_patches *patches;
     const alb_tracer *tracer;
+    float *nearness_per_mm; // of each patch, on return, where they are cast
 } source;
 
 static void take_row(uint32_t *row, alb_form_factors *factors, const source *from, size_t patch)
@@ -84,6 +103,8 @@ static void take_row(uint32_t *row, alb_form_factors *factors, const source *fro
         __atomic_add_fetch(&factors->reshot_rays, slipped, __ATOMIC_RELAXED); // counting is the same in any order
     }
     note_row(factors, row, patch);
+    if (from->nearness_per_mm)
+        from->nearness_per_mm[patch] = nearness_per_mm(factors, row, from->patches, patch);
 }
 
 static bool fill(alb_form_factors *factors, const source *from, alb_error *error)
@@ -118,9 +139,30 @@ static bool fill(alb_form_factors *factors, const source *from, alb_error *error
     return true;
 }
 
-static bool build(alb_form_factors *factors, const source *from, const uint32_t *lengths, alb_error *error)
+// The patches' own shares of rays, made common.
+static void share_open_rays(alb_form_factors *factors, double (*room)[3])
 {
-    const bool ok = allocate(factors, lengths, error) && fill(factors, from, error);
+    for (size_t p = 0; p < factors->patch_count; p++)
+        room[p][0] = (double)factors->sky_shares[p], room[p][1] = (double)factors->back_shares[p];
+    alb_form_factors_share(room, factors);
+    for (size_t p = 0; p < factors->patch_count; p++)
+        factors->sky_shares[p] = (float)room[p][0], factors->back_shares[p] = (float)room[p][1];
+}
+
+static bool build(alb_form_factors *factors, const source *given, const uint32_t *lengths, alb_error *error)
+{
+    source from = *given;
+    double(*room)[3] = NULL;
+    bool ok = allocate(factors, lengths, error) &&
+              (!from.patches || ((from.nearness_per_mm = alb_allocate(factors->patch_count, sizeof(float), error)) &&
+                                 (room = alb_allocate(factors->patch_count, sizeof *room, error)))) &&
+              fill(factors, &from, error) &&
+              (!from.patches ||
+               alb_row_shares_create(&factors->shares, from.patches, factors->rows.first, from.nearness_per_mm, error));
+    if (ok && from.patches)
+        share_open_rays(factors, room);
+    free(from.nearness_per_mm);
+    free(room);
     if (!ok)
         alb_form_factors_free(factors);
     return ok;
@@ -181,6 +223,7 @@ bool alb_form_factors_cast_again(alb_form_factors *factors, const alb_patches *p
 void alb_form_factors_free(alb_form_factors *factors)
 {
     alb_hit_rows_free(&factors->rows);
+    alb_row_shares_free(&factors->shares);
     free(factors->sky_shares);
     free(factors->back_shares);
     free(factors->sky_mask);
@@ -191,8 +234,8 @@ void alb_form_factors_free(alb_form_factors *factors)
 size_t alb_form_factors_bytes(const alb_form_factors *factors)
 {
     const size_t n = factors->patch_count, words = factors->rows.first[n] / 64 + factors->rows.chunks + 1;
-    return alb_hit_rows_bytes(&factors->rows) + 2 * n * sizeof(float) + (n + 2) * sizeof *factors->gathered +
-           (factors->sky_mask ? words * sizeof *factors->sky_mask : 0);
+    return alb_hit_rows_bytes(&factors->rows) + alb_row_shares_bytes(&factors->shares) + 2 * n * sizeof(float) +
+           (n + 2) * sizeof *factors->gathered + (factors->sky_mask ? words * sizeof *factors->sky_mask : 0);
 }
 
 void alb_form_factors_row(uint32_t *hits, const alb_form_factors *factors, size_t patch)
@@ -218,10 +261,21 @@ static void take_values(const alb_form_factors *factors, const double (*radiosit
         factors->gathered[n][c] = sky ? (float)sky[c] : 0;
 }
 
-void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3])
+void alb_form_factors_share(double (*values)[3], const alb_form_factors *factors)
+{
+    alb_row_shares_apply(values, factors->gathered, &factors->shares);
+}
+
+void alb_form_factors_apply_rows(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3])
 {
     take_values(factors, radiosity, NULL);
     alb_hit_rows_gather(out, &factors->rows, (const float(*)[4])factors->gathered);
+}
+
+void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3])
+{
+    alb_form_factors_apply_rows(out, factors, radiosity);
+    alb_form_factors_share(out, factors);
 }
 
 void alb_form_factors_half_difference(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3],
@@ -229,4 +283,5 @@ void alb_form_factors_half_difference(double (*out)[3], const alb_form_factors *
 {
     take_values(factors, radiosity, sky);
     alb_hit_rows_gather_difference(out, &factors->rows, (const float(*)[4])factors->gathered);
+    alb_form_factors_share(out, factors);
 }

@@ -2,6 +2,7 @@
 #pragma once
 #include "render/form_factor_cast.h"
 #include "render/form_factor_rows.h"
+#include "render/form_factor_share.h"
 
 enum { ALB_RAYS_MAX = 1 << 16 }; // a patch
 
@@ -11,9 +12,10 @@ typedef struct alb_form_factors {
     int rays;                // a patch, where a stated error has not asked for more
     uint64_t seed;
     alb_sampling sampling;
-    size_t memory_bytes; // hits beyond it lie in a file; 0: no limit
-    alb_hit_rows rows;   // of each patch: patch index; patch_count: the sky; patch_count + 1: the back of a patch
-    float *sky_shares, *back_shares;         // of each patch's rays
+    size_t memory_bytes;   // hits beyond it lie in a file; 0: no limit
+    alb_hit_rows rows;     // of each patch: patch index; patch_count: the sky; patch_count + 1: the back of a patch
+    alb_row_shares shares; // what neighbours gather in common
+    float *sky_shares, *back_shares;         // of each patch's rays and of those it shares
     uint64_t *sky_mask;                      // of the rays in the order of rows.first, one bit each; NULL: no sky
     size_t sky_rays, back_rays, reshot_rays; // in all; reshot: slipped through a crack, and cast again
     float (*gathered)[4];                    // scratch of the products: radiosity of the patches, the sky and backs
@@ -49,9 +51,14 @@ void alb_form_factors_row(uint32_t *hits, const alb_form_factors *factors, size_
 bool alb_form_factors_sees_sky(const alb_form_factors *factors, size_t patch, int q);
 alb_vector alb_form_factors_direction(const alb_form_factors *factors, const alb_patches *patches, size_t patch, int q);
 
-// out = F radiosity, RGB: the irradiance that patches send to each other. out and radiosity have patch_count rows.
-// Gathered in single precision (1e-7 relative); one product at a time for one alb_form_factors, its scratch is shared.
+// out = F radiosity, RGB: the irradiance that patches send to each other, by their own rays and those of neighbours
+// that see nearly the same (form_factor_share.h). out and radiosity have patch_count rows. Gathered in single precision
+// (1e-7 relative); one product at a time for one alb_form_factors, its scratch is shared.
 void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3]);
+// The same by their own rays alone.
+void alb_form_factors_apply_rows(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3]);
+// values, of each patch by its own rays, become what patches that share rays have in common.
+void alb_form_factors_share(double (*values)[3], const alb_form_factors *factors);
 
 // --- the error of the rows -------------------------------------------------------------------------------------------
 // out = (F_even - F_odd) radiosity / 2, the halves of the rays apart: its rms over the patches is the rms

@@ -12,11 +12,12 @@
 // Stops being true: for light unlike the radiosity that was given, and where 33 patches with their rays all miss what
 // is bright.
 #include "base/memory.h"
+#include "base/morton.h"
 #include "render/form_factor.h"
 #include <stdlib.h>
 #include <string.h>
 
-enum { WINDOW = 16, ROUNDS = 3, STEPS = 60 };
+enum { WINDOW = 16, ROUNDS = 5, STEPS = 60 };
 
 static const double quantile = 2.33; // of the normal distribution at 99 %: refining stops at a draw that looks good
 static const double growth = 1.2;    // of a row's rays in a step
@@ -124,29 +125,11 @@ static int by_code(const void *a, const void *b)
     return p->patch < q->patch ? -1 : p->patch > q->patch;
 }
 
-// 21 bits of x, two apart.
-static uint64_t spread(double x)
-{
-    uint64_t bits = (uint64_t)(x * 0x1fffff), out = 0;
-    for (int k = 0; k < 21; k++)
-        out |= (bits >> k & 1) << 3 * k;
-    return out;
-}
-
 static void order_patches(place *places, const alb_patches *patches)
 {
-    alb_vector low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t p = 0; p < patches->count; p++) {
-        const alb_vector c = patches->centroids[p];
-        low = (alb_vector){fmin(low.x, c.x), fmin(low.y, c.y), fmin(low.z, c.z)};
-        high = (alb_vector){fmax(high.x, c.x), fmax(high.y, c.y), fmax(high.z, c.z)};
-    }
-    const alb_vector size = alb_sub(high, low);
-    const double scale = 1 / fmax(fmax(size.x, size.y), fmax(size.z, 1e-300));
-    for (size_t p = 0; p < patches->count; p++) {
-        const alb_vector at = alb_times(scale, alb_sub(patches->centroids[p], low));
-        places[p] = (place){spread(at.x) | spread(at.y) << 1 | spread(at.z) << 2, (uint32_t)p};
-    }
+    const alb_morton curve = alb_morton_of(patches->centroids, patches->count);
+    for (size_t p = 0; p < patches->count; p++)
+        places[p] = (place){alb_morton_place(&curve, patches->centroids[p], 21), (uint32_t)p};
     qsort(places, patches->count, sizeof *places, by_code);
 }
 

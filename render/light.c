@@ -45,9 +45,12 @@ void alb_light_sky(double radiance[3], const alb_light *light, alb_vector direct
     }
 }
 
-static void add_environment(double (*irradiance)[3], const alb_light *light, const alb_patches *patches,
-                            const alb_form_factors *factors)
+static bool add_environment(double (*irradiance)[3], const alb_light *light, const alb_patches *patches,
+                            const alb_form_factors *factors, alb_error *error)
 {
+    double(*sky)[3] = alb_allocate(patches->count, sizeof *sky, error);
+    if (!sky)
+        return false;
 #pragma omp parallel for schedule(dynamic, 64)
     for (size_t p = 0; p < patches->count; p++) {
         double sum[3] = {0};
@@ -61,8 +64,14 @@ static void add_environment(double (*irradiance)[3], const alb_light *light, con
                 sum[c] += radiance[c];
         }
         for (int c = 0; c < 3; c++)
-            irradiance[p][c] += M_PI * sum[c] / rays;
+            sky[p][c] = M_PI * sum[c] / rays;
     }
+    alb_form_factors_share(sky, factors);
+    for (size_t p = 0; p < patches->count; p++)
+        for (int c = 0; c < 3; c++)
+            irradiance[p][c] += sky[p][c];
+    free(sky);
+    return true;
 }
 
 // Mean of cos / (4 pi d^2) over the patch, zero where the light is hidden. The four outermost points look first: where
@@ -214,8 +223,7 @@ bool alb_light_add(double (*irradiance)[3], const alb_light *light, const alb_pa
 {
     switch (light->kind) {
     case ALB_LIGHT_ENVIRONMENT:
-        add_environment(irradiance, light, patches, factors);
-        return true;
+        return add_environment(irradiance, light, patches, factors, error);
     case ALB_LIGHT_POINT:
         add_point(irradiance, light, patches, tracer, seed, stream);
         return true;

@@ -52,12 +52,23 @@ static bool is_opaque(const alb_scatter *scatter, size_t p)
     return !memcmp(scatter->local[p], scatter->row_sums[p], sizeof scatter->local[p]);
 }
 
+// What neighbours' rays add to a patch's own: lags by a sweep.
+static void gather_shared(alb_rgb *out, const alb_form_factors *factors, const alb_rgb *x, alb_rgb *room)
+{
+    alb_form_factors_apply(out, factors, x);
+    alb_form_factors_apply_rows(room, factors, x);
+    for (size_t p = 0; p < factors->patch_count; p++)
+        for (int c = 0; c < 3; c++)
+            out[p][c] -= room[p][c];
+}
+
 // An opaque patch sends out at once what it gathers; bodies scatter at the end of the sweep.
 static void sweep(alb_rgb *x, const void *data, const alb_rgb *right)
 {
     const alb_radiosity *equations = data;
     const alb_scatter *scatter = equations->scatter;
     const size_t n = scatter->patch_count;
+    gather_shared(equations->gathered, equations->factors, (const alb_rgb *)x, equations->scattered);
     for (size_t p = 0; p < n; p++) {
         const int rays = alb_form_factors_rays(equations->factors, p);
         double sum[3] = {0};
@@ -66,9 +77,9 @@ static void sweep(alb_rgb *x, const void *data, const alb_rgb *right)
             for (int c = 0; c < 3 && equations->row[q] < n; c++)
                 sum[c] += x[equations->row[q]][c];
         for (int c = 0; c < 3; c++) {
-            equations->gathered[p][c] = sum[c] / rays;
+            equations->gathered[p][c] += sum[c] / rays;
             if (is_opaque(scatter, p))
-                x[p][c] = right[p][c] + scatter->local[p][c] * sum[c] / rays;
+                x[p][c] = right[p][c] + scatter->local[p][c] * equations->gathered[p][c];
         }
     }
     alb_scatter_apply(equations->scattered, scatter, (const alb_rgb *)equations->gathered);

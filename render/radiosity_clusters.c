@@ -7,6 +7,7 @@
 // is a guess that the solver corrects: what it gets wrong costs products, not accuracy.
 #include "render/radiosity_clusters.h"
 #include "base/memory.h"
+#include "base/morton.h"
 #include "base/vector_clones.h"
 #include "render/radiosity_solver.h"
 #include <stdlib.h>
@@ -28,15 +29,6 @@ static int by_key(const void *a, const void *b)
     if (x->key != y->key)
         return x->key < y->key ? -1 : 1;
     return (x->patch > y->patch) - (x->patch < y->patch);
-}
-
-// Ten bits with two zeros after each.
-static uint64_t spread(double share)
-{
-    uint64_t bits = (uint64_t)fmin(1023, fmax(0, 1024 * share)), out = 0;
-    for (int k = 0; k < 10; k++)
-        out |= (bits >> k & 1) << (3 * k);
-    return out;
 }
 
 static uint64_t main_direction(alb_vector n)
@@ -65,18 +57,11 @@ static float patches_seen(uint32_t *row, const alb_form_factors *factors, uint32
 
 static void place(placed *out, const alb_patches *patches, const alb_form_factors *factors, uint32_t *row)
 {
-    alb_vector low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t p = 0; p < patches->count; p++) {
-        const alb_vector c = patches->centroids[p];
-        low = (alb_vector){fmin(low.x, c.x), fmin(low.y, c.y), fmin(low.z, c.z)};
-        high = (alb_vector){fmax(high.x, c.x), fmax(high.y, c.y), fmax(high.z, c.z)};
-    }
-    const double side = fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z));
+    const alb_morton curve = alb_morton_of(patches->centroids, patches->count);
     for (uint32_t p = 0; p < patches->count; p++) {
-        const alb_vector c = alb_times(side > 0 ? 1 / side : 0, alb_sub(patches->centroids[p], low));
         const uint64_t group = patches->mesh->groups[p];
-        out[p].key =
-            group << 36 | main_direction(patches->normals[p]) << 32 | spread(c.x) << 2 | spread(c.y) << 1 | spread(c.z);
+        out[p].key = group << 36 | main_direction(patches->normals[p]) << 32 |
+                     alb_morton_place(&curve, patches->centroids[p], 10);
         out[p].patch = p;
         out[p].sees = patches_seen(row, factors, p);
     }

@@ -83,8 +83,8 @@ static bool light_first(sequence *s, const alb_scene *scene, alb_error *error)
     s->small_share = alb_shadow_small_lights(&world, scene->mesh.vertices, s->stage.normals, scene->mesh.vertex_count);
     if (s->small_share > 0)
         fprintf(stderr,
-                "render: from %.0f %% of the vertices a light is less than %d degrees in half-angle: the shadows of "
-                "objects on themselves are blurred\n",
+                "render: from %.0f %% of the vertices a light is less than %d degrees in half-angle: the edges of its "
+                "shadows are blurred\n",
                 100 * s->small_share, ALB_SHADOW_SMALL_DEG);
     return alb_shadow_error(&s->verdict, &s->stage, scene, scene->seed, error);
 }

@@ -27,6 +27,7 @@ typedef struct alb_shadow_emitter {
     alb_shadow_sphere groups[ALB_SHADOW_EMITTER_GROUPS]; // in mm: about the middle, of a disc of the area
     float *seen;                                         // [group][node]: share that the light itself leaves of it
     bool hidden[ALB_SHADOW_EMITTER_GROUPS];              // somewhere the share is below 1
+    bool moved;                                          // when last placed
     alb_vector *vertices;                                // for which
     size_t vertex_count;
     alb_tracer tracer; // stays at its address

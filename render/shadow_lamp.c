@@ -2,8 +2,9 @@
 //     E = sum_s g V L_s max(0, -a_s.d) max(0, n.d) / sqrt(r^4 + (a_s / pi)^2),      d = (y_s - x) / r
 // The root keeps what is near finite: a disc's pi L where it is touched. As its own cosine each sample is exact where a
 // light sets. V is what the occluders leave, the product over them of 1 - w O along the line to the middle of the
-// samples' group (shadow_along.h), w as in shadow_block.c: nothing of the light or of a product is cut to order 4, only
-// what an occluder's samples say of a line is blurred. g is what the light's own parts leave of the group towards x.
+// samples' group (shadow_along.h), w as in shadow_block.c, and of a receiver's own object by rays from its probes
+// (shadow_glimpse.h): nothing of the light or of a product is cut to order 4, only what an occluder's samples say of a
+// line is blurred. g is what the light's own parts leave of the group towards x.
 //
 // Without samples, after Zhou et al. 2005 and Wang et al. 2006, E = integral P L: P is the cosine through all occluders
 // in order 4 (shadow_block.h), L is k^-2 M^E(k) of the light's sample; as M^E(k) is M^V(1/k) transposed, P is scaled
@@ -72,8 +73,8 @@ typedef struct glow {
     float points[3 * BLOCK], normals[3 * BLOCK];
     float groups[GROUPS][3][BLOCK]; // irradiance
     const alb_shadow_sphere *light;
+    size_t light_index;
     float directions[3 * BLOCK]; // to the middle of a group
-    bool shaded;                 // some receivers' own objects hide something from them
 } glow;
 
 ALB_VECTOR_CLONES static void add_sample(float (*restrict sum)[BLOCK], float *restrict nearest, const float *points,
@@ -125,10 +126,6 @@ static void find_glow(glow *g, const alb_shadow_block *b, const alb_shadow_emitt
         g->normals[r] = (float)n.x, g->normals[BLOCK + r] = (float)n.y, g->normals[2 * BLOCK + r] = (float)n.z;
     }
     g->light = sphere;
-    g->shaded = false;
-    for (size_t r = 0; r < b->count && !g->shaded; r++)
-        for (size_t i = 0; b->own[r] != SIZE_MAX && i < VALUES; i++)
-            g->shaded |= b->hidden[i * BLOCK + r] != 0;
     for (size_t group = 0; group < emitter->group_count; group++)
         add_group(g, emitter, group, b->count);
 }
@@ -148,24 +145,6 @@ static float before(const glow *g, const alb_shadow_block *b, const alb_shadow_w
     return (float)fmax(part, larger * alb_shadow_share_before(sphere, g->light, mm, whole_mm));
 }
 
-// visible[r] *= what the probes on a receiver's own object leave of the line's cosine.
-static void take_hidden(float *visible, const glow *g, const alb_shadow_block *b, const alb_shadow_world *world,
-                        const alb_shadow_sphere *group)
-{
-    float basis[VALUES * BLOCK];
-    alb_sh_evaluate_batch(basis, ORDER, g->directions, BLOCK, b->count);
-    for (size_t r = 0; r < b->count; r++) {
-        if (b->own[r] == SIZE_MAX)
-            continue;
-        float hidden = 0, cosine = 0;
-        for (size_t i = 0; i < VALUES; i++)
-            hidden += b->hidden[i * BLOCK + r] * basis[i * BLOCK + r];
-        for (size_t i = 0; i < 3; i++)
-            cosine += g->normals[i * BLOCK + r] * g->directions[i * BLOCK + r];
-        visible[r] *= 1 - before(g, b, world, b->own[r], r, group) * fminf(fmaxf(hidden / fmaxf(cosine, 0.1F), 0), 1);
-    }
-}
-
 ALB_VECTOR_CLONES static void aim(float *restrict directions, const float *restrict points, const float *middle,
                                   size_t count)
 {
@@ -178,29 +157,36 @@ ALB_VECTOR_CLONES static void aim(float *restrict directions, const float *restr
     }
 }
 
-// visible[r] *= what occluders leave of the lines to a group.
+// visible[r] *= what occluders leave of a group: a receiver's own by rays of its probes, others along the line.
 static void find_visible(float *visible, const glow *g, const alb_shadow_block *b, const alb_shadow_world *world,
-                         const alb_shadow_sphere *group, const float *wanted)
+                         size_t group, const float *wanted)
 {
+    const alb_shadow_sphere *sphere = &world->emitters[g->light_index].groups[group];
     float occlusion[BLOCK], lines[BLOCK];
-    if (g->shaded)
-        take_hidden(visible, g, b, world, group);
+    for (size_t r = 0; r < b->count; r++) {
+        const size_t o = b->own[r];
+        if (o != SIZE_MAX && wanted[r] > 0)
+            visible[r] *= alb_shadow_glimpse_at(&world->glimpses[o], &world->surfaces[o], g->light_index, group,
+                                                b->first + r - world->first_vertices[o]);
+    }
     for (size_t o = 0; o < world->occluder_count; o++) {
         for (size_t r = 0; r < b->count; r++)
             lines[r] = b->own[r] != o ? wanted[r] : 0;
-        alb_shadow_along(occlusion, &world->occluders[o], b->raised[o], g->directions, lines, b->count);
+        alb_shadow_along(occlusion, &world->occluders[o], b->raised[o], g->directions, lines, world->surfaces != NULL,
+                         b->count);
         for (size_t r = 0; r < b->count; r++)
             if (occlusion[r] > 0)
-                visible[r] *= 1 - before(g, b, world, o, r, group) * occlusion[r];
+                visible[r] *= 1 - before(g, b, world, o, r, sphere) * occlusion[r];
     }
 }
 
-static void add_samples(float (*irradiance)[3], const alb_shadow_block *b, const alb_shadow_world *world,
-                        const alb_shadow_field *light, const alb_shadow_emitter *emitter)
+static void add_samples(float (*irradiance)[3], const alb_shadow_block *b, const alb_shadow_world *world, size_t j)
 {
     glow g;
     float visible[BLOCK], wanted[BLOCK];
-    find_glow(&g, b, emitter, &light->sphere);
+    const alb_shadow_emitter *emitter = &world->emitters[j];
+    g.light_index = j;
+    find_glow(&g, b, emitter, &world->lights[j].sphere);
     for (size_t group = 0; group < emitter->group_count; group++) {
         const float(*sent)[BLOCK] = (const float(*)[BLOCK])g.groups[group];
         float most = 0;
@@ -214,7 +200,7 @@ static void add_samples(float (*irradiance)[3], const alb_shadow_block *b, const
             const alb_vector away = {-(double)d[0], -(double)d[BLOCK], -(double)d[2 * BLOCK]};
             visible[r] = wanted[r] > 0 ? alb_shadow_emitter_seen(emitter, group, away) : 0;
         }
-        find_visible(visible, &g, b, world, &emitter->groups[group], wanted);
+        find_visible(visible, &g, b, world, group, wanted);
         for (size_t r = 0; r < b->count; r++)
             for (int c = 0; c < 3; c++)
                 irradiance[r][c] += visible[r] * sent[c][r];
@@ -224,7 +210,7 @@ static void add_samples(float (*irradiance)[3], const alb_shadow_block *b, const
 void alb_shadow_lamp_add(float (*irradiance)[3], const alb_shadow_block *b, const alb_shadow_world *world, size_t j)
 {
     if (world->emitters)
-        add_samples(irradiance, b, world, &world->lights[j], &world->emitters[j]);
+        add_samples(irradiance, b, world, j);
     else
         add_product(irradiance, b, world, &world->lights[j]);
 }

@@ -2,6 +2,7 @@
 #pragma once
 #include "render/shadow_emitter.h"
 #include "render/shadow_field.h"
+#include "render/shadow_glimpse.h"
 #include "render/shadow_laws.h"
 #include "render/shadow_sky.h"
 #include "render/shadow_surface.h"
@@ -19,6 +20,7 @@ typedef struct alb_shadow_world {
     const alb_shadow_transport *transport; // NULL: none; else receivers are the vertices it was made for
     const bool *of_body;                   // whether each occluder belongs to its body
     const alb_shadow_surface *surfaces;    // NULL: none; else of each occluder, without probes where it has none
+    const alb_shadow_glimpse *glimpses;    // of the surfaces, where there are both surfaces and emitters
     const size_t *first_vertices;          // of each occluder with a surface, among the receivers
 } alb_shadow_world;
 
@@ -33,7 +35,7 @@ bool alb_shadow_irradiance(float (*irradiance)[3], const alb_shadow_world *world
                            const alb_vector *normals, size_t count, alb_shadow_seconds *seconds, alb_error *error);
 
 // Of the receivers that face a light with a field, the share from which its bounding sphere is less than
-// ALB_SHADOW_SMALL_DEG in half-angle: order 4 then blurs what objects hide of it from themselves.
+// ALB_SHADOW_SMALL_DEG in half-angle: what its shadows have finer than order 8 is then lost.
 #define ALB_SHADOW_SMALL_DEG 20
 double alb_shadow_small_lights(const alb_shadow_world *world, const alb_vector *points, const alb_vector *normals,
                                size_t count);

@@ -85,6 +85,9 @@ static void free_fields(alb_shadow_stage *stage)
     free(stage->irradiance);
     for (size_t i = 0; stage->surfaces && i < stage->occluder_count; i++)
         alb_shadow_surface_free(&stage->surfaces[i]);
+    for (size_t i = 0; stage->glimpses && i < stage->occluder_count; i++)
+        alb_shadow_glimpse_free(&stage->glimpses[i]);
+    free(stage->glimpses);
     free(stage->surfaces);
     free(stage->first_vertices);
     free(stage->of_body);
@@ -143,6 +146,16 @@ static bool create_transport(alb_shadow_stage *stage, const alb_scene *scene, co
     return ok;
 }
 
+static bool create_glimpses(alb_shadow_stage *stage, alb_error *error)
+{
+    if (!stage->emitters || !stage->light_count || !stage->settings.probes)
+        return true;
+    bool ok = (stage->glimpses = alb_allocate(stage->occluder_count, sizeof *stage->glimpses, error));
+    for (size_t o = 0; ok && o < stage->occluder_count; o++)
+        ok = alb_shadow_glimpse_create(&stage->glimpses[o], &stage->surfaces[o], stage->light_count, error);
+    return ok;
+}
+
 static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
 {
     const alb_mesh *mesh = &scene->mesh;
@@ -170,7 +183,7 @@ static bool create_fields(alb_shadow_stage *stage, const alb_scene *scene, alb_e
         for (size_t o = 0; ok && o < n; o++)
             if (shines[o] == (light == 1) && (light || !scene->objects[o].receives_only))
                 ok = add_field(stage, scene, o, light, order, error);
-    ok = ok && create_transport(stage, scene, shines, error);
+    ok = ok && create_glimpses(stage, error) && create_transport(stage, scene, shines, error);
     free(shines);
     if (!ok)
         return false;
@@ -227,7 +240,39 @@ alb_shadow_world alb_shadow_stage_world(const alb_shadow_stage *stage)
                               .transport = stage->transport.row_count ? &stage->transport : NULL,
                               .of_body = stage->of_body,
                               .surfaces = stage->settings.probes ? stage->surfaces : NULL,
+                              .glimpses = stage->settings.probes ? stage->glimpses : NULL,
                               .first_vertices = stage->first_vertices};
+}
+
+static bool place_lights(alb_shadow_stage *stage, const alb_vector *vertices, alb_error *error)
+{
+    bool ok = true;
+    for (size_t j = 0; ok && stage->emitters && j < stage->light_count; j++) {
+        const size_t light = stage->occluder_count + j;
+        ok = alb_shadow_emitter_place(&stage->emitters[j], vertices + stage->first_vertices[light],
+                                      &stage->fields[light].sphere, error);
+    }
+    return ok;
+}
+
+// After the lights are placed.
+static bool sample_surfaces(alb_shadow_stage *stage, const alb_vector *vertices, alb_error *error)
+{
+    for (size_t i = 0; stage->settings.probes && i < stage->occluder_count; i++) {
+        alb_shadow_surface *surface = &stage->surfaces[i];
+        const size_t first = stage->first_vertices[i];
+        const alb_vector *here = vertices + first, *normals = stage->normals + first;
+        if (!stage->light_count && stage->of_body[i]) // skies have the transport of what is rigid
+            continue;
+        const bool moved =
+            !surface->sampled || memcmp(here, surface->mesh.vertices, surface->mesh.vertex_count * sizeof *here) != 0;
+        if (!alb_shadow_surface_sample(surface, here, normals, error))
+            return false;
+        for (size_t j = 0; stage->glimpses && j < stage->light_count; j++)
+            if (moved || stage->emitters[j].moved)
+                alb_shadow_glimpse_take(&stage->glimpses[i], surface, normals, &stage->emitters[j], j);
+    }
+    return true;
 }
 
 bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb_error *error)
@@ -249,15 +294,7 @@ bool alb_shadow_stage_light(alb_shadow_stage *stage, const alb_scene *scene, alb
     for (size_t i = 0; ok && i < stage->occluder_count + stage->light_count; i++)
         ok = alb_shadow_field_sample(&stage->fields[i], mesh->vertices + scene->objects[stage->objects[i]].first_vertex,
                                      error);
-    for (size_t i = 0; ok && stage->settings.probes && i < stage->occluder_count; i++)
-        if (stage->light_count || !stage->of_body[i]) // skies have the transport of what is rigid
-            ok = alb_shadow_surface_sample(&stage->surfaces[i], mesh->vertices + stage->first_vertices[i],
-                                           stage->normals + stage->first_vertices[i], error);
-    for (size_t i = 0; ok && stage->emitters && i < stage->light_count; i++) {
-        const size_t light = stage->occluder_count + i;
-        ok = alb_shadow_emitter_place(&stage->emitters[i], mesh->vertices + stage->first_vertices[light],
-                                      &stage->fields[light].sphere, error);
-    }
+    ok = ok && place_lights(stage, mesh->vertices, error) && sample_surfaces(stage, mesh->vertices, error);
     const double sampled_s = alb_clock_s();
     if (ok) {
         const alb_shadow_world world = alb_shadow_stage_world(stage);

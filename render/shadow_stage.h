@@ -17,6 +17,7 @@ typedef struct alb_shadow_stage {
     alb_shadow_transport transport; // of what is rigid, for the skies
     bool *of_body;                  // whether each occluder is part of it
     alb_shadow_surface *surfaces;   // of the occluders, if settings have probes
+    alb_shadow_glimpse *glimpses;   // of the surfaces, if there are emitters
     size_t *first_vertices;         // of each occluder
     alb_shadow_sky *skies;
     size_t sky_count;

@@ -1,5 +1,7 @@
 // Random numbers, statistics and the camera.
 #include "base/camera.h"
+#include "base/morton.h"
+#include "base/quadrature.h"
 #include "base/random.h"
 #include "base/statistics.h"
 #include "check.h"
@@ -129,11 +131,57 @@ static void pixel_areas_add_up(void **state)
     check_relative(sum, fabs(shoelace), 1e-5); // the pixel's quadrilateral is taken to second order in its size
 }
 
+// The corners of a box in the order of their bits, x highest; neighbours along x of a fine grid alike but for it.
+static void morton_curve_takes_bits_in_turns(void **state)
+{
+    (void)state;
+    alb_vector corners[8];
+    for (int k = 0; k < 8; k++)
+        corners[k] = (alb_vector){3 + (k >> 2), -2 + 0.5 * (k >> 1 & 1), 0.25 * (k & 1)};
+    const alb_morton box = alb_morton_of(corners, 8), none = alb_morton_of(corners, 1);
+    const alb_morton cube = {{0, 0, 0}, 1};
+    assert_int_equal(alb_morton_place(&none, corners[0], 21), 0);
+    for (int k = 0; k < 8; k++) { // the box's longest side is x's: y ends at its half, z at its quarter
+        const uint64_t along = (k >> 2 ? 0444 : 0) | (k >> 1 & 1 ? 0200 : 0) | (k & 1 ? 0010 : 0);
+        assert_int_equal(alb_morton_place(&box, corners[k], 3), along);
+        assert_int_equal(alb_morton_place(&cube, (alb_vector){k >> 2, k >> 1 & 1, k & 1}, 1), k);
+    }
+    assert_int_equal(alb_morton_place(&cube, (alb_vector){1, 1, 1}, 21), (UINT64_C(1) << 63) - 1);
+}
+
+// Exact for the monomials of degree 2 n - 1 and below, asked for by many threads at once, the first time and again.
+static void gauss_nodes_are_exact_for_every_thread(void **state)
+{
+    (void)state;
+    static double worst[4][65];
+#pragma omp parallel for schedule(dynamic, 1) collapse(2)
+    for (int time = 0; time < 4; time++)
+        for (int n = 1; n <= 64; n++) {
+            double node[64], weight[64];
+            alb_quadrature_gauss(node, weight, n, 0, 2);
+            for (int degree = 0; degree < 2 * n; degree++) {
+                double sum = 0;
+                for (int i = 0; i < n; i++)
+                    sum += weight[i] * pow(node[i] / 2, degree);
+                worst[time][n] = fmax(worst[time][n], fabs(sum * (degree + 1) / 2 - 1));
+            }
+        }
+    for (int time = 0; time < 4; time++)
+        for (int n = 1; n <= 64; n++) {
+            check_below(worst[time][n], 1e-11); // the roots round to 1e-16, and weights at the ends amplify that
+            assert_true(worst[time][n] == worst[0][n]);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_moments),     cmocka_unit_test(poisson_distribution),
-        cmocka_unit_test(chi_square_values),  cmocka_unit_test(camera_inverts_its_distortion),
+        cmocka_unit_test(morton_curve_takes_bits_in_turns),
+        cmocka_unit_test(gauss_nodes_are_exact_for_every_thread),
+        cmocka_unit_test(random_moments),
+        cmocka_unit_test(poisson_distribution),
+        cmocka_unit_test(chi_square_values),
+        cmocka_unit_test(camera_inverts_its_distortion),
         cmocka_unit_test(pixel_areas_add_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -310,6 +310,58 @@ static void receiver_crosses_the_bounding_sphere(void **state)
     alb_mesh_free(&mesh);
 }
 
+// Below two balls that are one object, within their common sphere: as points of another surface, of which the object
+// hides nothing behind them, and as any points, by the cone map of directions.
+static void receivers_inside_the_sphere(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_mesh balls = {0}, lamp = {0};
+    const alb_vector at = {0, 0, 12}, up = {0, 0, 1};
+    for (int side = -1; side <= 1; side += 2) {
+        alb_mesh ball = {0};
+        check_ok(alb_shape_sphere(&ball, &(alb_sphere){{3 * side, 0, 4}, 1, 3, false}, &error), &error);
+        check_ok(alb_mesh_append(&balls, &ball, 1, (alb_vector){0}, &error), &error);
+        alb_mesh_free(&ball);
+    }
+    make_sheet(&lamp, at, 2);
+    stage *s = new_stage(&lamp, NULL);
+    add_occluder(s, &balls, ALB_SH_ORDER_MAX);
+    alb_tracer tracer;
+    check_ok(alb_tracer_create(&tracer, &balls, &error), &error);
+    const alb_shadow_surface none = {0};
+    const size_t first = 0;
+    s->world.first_vertices = &first;
+    for (int apart = 0; apart < 2; apart++) {
+        double sum = 0, lost = 0, mean = 0;
+        int count = 0;
+        s->world.surfaces = apart ? &none : NULL; // without probes
+        for (double x = -3; x <= 3; x += 0.25)
+            for (double z = 1.5; z < 3; z += 0.5, count++) {
+                const alb_vector p = {x, 0.2, z};
+                double truth = 0, open = 0;
+                float found[3];
+                for (int i = 0; i < 400; i++) {
+                    const alb_vector y = {(i % 20 + 0.5) / 5 - 2, (i / 20 + 0.5) / 5 - 2, at.z}, to = alb_sub(y, p);
+                    const double e = to.z * to.z / pow(alb_dot(to, to), 2) * 16 / 400;
+                    open += e;
+                    truth += alb_tracer_blocked(&tracer, p, y) ? 0 : e;
+                }
+                irradiance(found, s, p, up);
+                sum += pow((double)found[0] - truth, 2);
+                lost += pow(open - truth, 2);
+                mean += truth;
+            }
+        print_message("inside the sphere, %s: rms %.3f of the mean, the shadow %.3f\n", apart ? "apart" : "anywhere",
+                      sqrt(sum * count) / mean, sqrt(lost * count) / mean);
+        check_below(sum, (apart ? 0.15 : 0.3) * lost); // one shell; .58 of the mean without the map
+    }
+    alb_tracer_free(&tracer);
+    free_stage(s);
+    alb_mesh_free(&balls);
+    alb_mesh_free(&lamp);
+}
+
 // Where no line to the light meets the occluder's sphere it has no effect at all; lengths have no scale; the bytes do
 // not depend on threads.
 static void laws(void **state)
@@ -359,6 +411,66 @@ static void laws(void **state)
         }
     }
     assert_true(apart > 20);
+}
+
+// A wall on a floor, one object: its probes see for the floor around them what the wall leaves of the light.
+static void object_shades_itself(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_mesh mesh = {0}, lamp = {0};
+    const alb_vector at = {8, 0, 8};
+    const size_t first = 0;
+    check_ok(
+        shape_sheet(&mesh, (alb_vector){-5, -5, 0}, (alb_vector){10, 0, 0}, (alb_vector){0, 10, 0}, 24, 24, 0, &error),
+        &error);
+    const size_t floor = mesh.vertex_count;
+    check_ok(shape_sheet(&mesh, (alb_vector){1, -3, 0}, (alb_vector){0, 6, 0}, (alb_vector){0, 0, 3}, 12, 6, 0, &error),
+             &error);
+    make_sheet(&lamp, at, 2);
+    stage *s = new_stage(&lamp, NULL);
+    add_occluder(s, &mesh, ALB_SH_ORDER_MAX);
+    static alb_vector normals[2000];
+    static float found[2000][3];
+    for (size_t v = 0; v < mesh.vertex_count; v++)
+        normals[v] = v < floor ? (alb_vector){0, 0, 1} : (alb_vector){1, 0, 0};
+    alb_shadow_surface surface;
+    alb_shadow_glimpse glimpse;
+    alb_tracer tracer;
+    check_ok(alb_shadow_surface_create(&surface, &mesh, normals, 500, &error), &error);
+    check_ok(alb_shadow_surface_sample(&surface, mesh.vertices, normals, &error), &error);
+    check_ok(alb_shadow_glimpse_create(&glimpse, &surface, 1, &error), &error);
+    alb_shadow_glimpse_take(&glimpse, &surface, normals, &s->emitter, 0);
+    check_ok(alb_tracer_create(&tracer, &mesh, &error), &error);
+    s->world.surfaces = &surface, s->world.glimpses = &glimpse, s->world.first_vertices = &first;
+    check_ok(alb_shadow_irradiance(found, &s->world, mesh.vertices, normals, floor, NULL, &error), &error);
+    double sum = 0, lost = 0, mean = 0;
+    for (size_t v = 0; v < floor; v++) {
+        const alb_vector p = alb_add(mesh.vertices[v], (alb_vector){0, 0, 1e-4});
+        if (fabs(p.x - 1) < 0.2)
+            continue; // in the wall
+        double truth = 0, open = 0;
+        for (int i = 0; i < 400; i++) {
+            const alb_vector y = {at.x + (i % 20 + 0.5) / 5 - 2, at.y + (i / 20 + 0.5) / 5 - 2, at.z},
+                             to = alb_sub(y, p);
+            const double e = to.z * to.z / pow(alb_dot(to, to), 2) * 16 / 400;
+            open += e;
+            truth += alb_tracer_blocked(&tracer, p, y) ? 0 : e;
+        }
+        sum += pow((double)found[v][0] - truth, 2);
+        lost += pow(open - truth, 2);
+        mean += truth;
+    }
+    print_message("a wall on its floor: rms %.3f of the mean, its shadow %.3f\n", sqrt(sum * (double)floor) / mean,
+                  sqrt(lost * (double)floor) / mean);
+    check_below(sqrt(sum * (double)floor) / mean, 0.05); // every second vertex is a probe
+    check_below(0.15, sqrt(lost * (double)floor) / mean);
+    alb_shadow_glimpse_free(&glimpse);
+    alb_shadow_surface_free(&surface);
+    alb_tracer_free(&tracer);
+    free_stage(s);
+    alb_mesh_free(&mesh);
+    alb_mesh_free(&lamp);
 }
 
 // The other oracle: rays aimed at a light have no bias, near and far, and far less noise than those that find it by
@@ -413,6 +525,8 @@ int main(void)
         cmocka_unit_test(light_hides_itself),
         cmocka_unit_test(light_inside_the_occluders_sphere),
         cmocka_unit_test(receiver_crosses_the_bounding_sphere),
+        cmocka_unit_test(receivers_inside_the_sphere),
+        cmocka_unit_test(object_shades_itself),
         cmocka_unit_test(laws),
         cmocka_unit_test(aimed_rays),
     };

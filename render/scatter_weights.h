@@ -1,0 +1,38 @@
+// S' of materials that do not change as stored weights: a product reads them through and looks no profile up.
+#pragma once
+#include "render/scatter_links.h"
+
+// Codes of eight bits, four of exponent and four of mantissa, shifted to their place in a float: 0, or from 2^-126 on.
+// Below 16 none but zero is used, for those would be denormal. Four sources share a word.
+enum { ALB_WEIGHT_GROUP = 4, ALB_WEIGHT_SHIFT = 19 };
+
+// What lights a block of exit patches: leaves below leaf_count, then nodes of the forest; the last group is filled up
+// with zeros. One allocation holds both.
+typedef struct alb_weight_block {
+    uint32_t first_leaf, row_count, group_count;
+    float scales[3][ALB_BLOCK]; // of the sums of codes
+    uint32_t *sources;
+    uint32_t (*codes)[3][ALB_BLOCK]; // of each group
+} alb_weight_block;
+
+typedef struct alb_weights {
+    size_t block_count, group_count;
+    alb_weight_block *blocks;
+    float *left_shares; // of nodes: the part of the area that the left child has
+    float (*lights)[4]; // of leaves and nodes: mean irradiance of R, G and B; workspace of a product
+} alb_weights;
+
+// From the links and kernels as they are. row_sums and local: of the patches. error_wanted: see
+// alb_scatter_keep_weights.
+bool alb_weights_create(alb_weights *weights, const alb_links *links, const alb_forest *forest,
+                        const alb_scatter_kernel *kernels, const double (*row_sums)[3], const double (*local)[3],
+                        double error_wanted, alb_error *error);
+void alb_weights_free(alb_weights *weights);
+size_t alb_weights_bytes(const alb_weights *weights, const alb_forest *forest);
+// Adds to the rows of out what the irradiance sends from other patches. The same bytes with any number of threads.
+void alb_weights_add(double (*out)[3], const alb_weights *weights, const alb_forest *forest,
+                     const double (*irradiance)[3]);
+// The largest error of products with the weights against those with the links, over lights around random patches.
+bool alb_weights_error(double *percent, const alb_weights *weights, const alb_links *links, alb_forest *forest,
+                       const alb_scatter_kernel *kernels, const double (*local)[3], size_t patch_count,
+                       alb_error *error);
