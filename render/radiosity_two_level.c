@@ -28,7 +28,8 @@ typedef struct run {
     alb_rgb *radiosity, *light, *rest; // B; E + h, later z; F B - h
     alb_rgb *even, *sent, *settled;    // of clusters: means, what they send out, and the coarse solution
     alb_rgb *along[STEPS], *sends[STEPS];
-    double bound[3]; // of the residual per length of sqrt(s) rest; 0: a dark channel
+    double squares[3]; // of M + S'E of the clusters, times area
+    double bound[3];   // of the residual per length of sqrt(s) rest; 0: a dark channel
     double floor;
 } run;
 
@@ -37,16 +38,12 @@ static const double minus_one[1][3] = {{-1, -1, -1}};
 static void find_bounds(run *r)
 {
     const alb_scatter *scatter = r->equations->scatter;
-    const alb_clusters *clusters = &r->equations->clusters;
-    double rows[3] = {0}, squares[3] = {0};
+    double rows[3] = {0};
     for (size_t p = 0; p < scatter->patch_count; p++)
         for (int c = 0; c < 3; c++)
             rows[c] = fmax(rows[c], scatter->row_sums[p][c]);
-    for (size_t k = 0; k < clusters->count; k++)
-        for (int c = 0; c < 3; c++)
-            squares[c] += clusters->areas_mm2[k] * r->sent[k][c] * r->sent[k][c];
     for (int c = 0; c < 3; c++)
-        r->bound[c] = squares[c] > 0 ? sqrt(rows[c] * r->space.total_mm2 / squares[c]) : 0;
+        r->bound[c] = r->squares[c] > 0 ? sqrt(rows[c] * r->space.total_mm2 / r->squares[c]) : 0;
 }
 
 static double worst_of(const run *r, const double length[3])
@@ -133,7 +130,10 @@ static void settle(run *r)
     const size_t n = r->space.count;
     memcpy(r->rest, r->light, n * sizeof *r->rest);
     add(r->light, r->irradiance, n);
+    const bool known = alb_scatter_rows_known(r->equations->scatter);
     alb_scatter_apply(r->radiosity, r->equations->scatter, (const alb_rgb *)r->light);
+    if (!known)
+        find_bounds(r);
     add(r->radiosity, r->exitance, n);
     alb_form_factors_apply(r->light, r->equations->factors, (const alb_rgb *)r->radiosity);
     alb_space_add(NULL, &r->space, r->light, minus_one, &r->rest, 1);
@@ -231,6 +231,9 @@ static void average_light(run *r)
     for (size_t k = 0; k < clusters->count; k++)
         for (int c = 0; c < 3; c++)
             r->sent[k][c] += r->settled[k][c];
+    for (size_t k = 0; k < clusters->count; k++)
+        for (int c = 0; c < 3; c++)
+            r->squares[c] += clusters->areas_mm2[k] * r->sent[k][c] * r->sent[k][c];
 }
 
 static bool solve(run *r, const alb_rgb *start, double residual, alb_error *error)

@@ -43,6 +43,8 @@ struct alb_scatter_parts {
     alb_bodies found;         // while links are made
     alb_optical_paths *paths; // likewise: of each body
     const uint16_t *materials;
+    double (*totals)[3]; // of each kernel's profiles, as they are
+    bool rows_known;     // the row sums are no estimate
     alb_weights weights; // empty: products look the profiles up
 };
 
@@ -187,7 +189,8 @@ static bool make_links(alb_scatter *scatter, const alb_patches *patches, const a
 static bool make_self_rules(alb_scatter *scatter, const alb_patches *patches, alb_error *error)
 {
     alb_scatter_parts *p = scatter->parts;
-    if (!(p->self = alb_allocate(p->forest.leaf_count, sizeof *p->self, error)))
+    if (!(p->totals = alb_allocate(p->kernel_count, sizeof *p->totals, error)) ||
+        !(p->self = alb_allocate(p->forest.leaf_count, sizeof *p->self, error)))
         return false;
     for (size_t i = 0; i < p->forest.tree_count; i++) {
         const alb_tree *tree = &p->forest.trees[i];
@@ -254,6 +257,7 @@ void alb_scatter_free(alb_scatter *scatter)
         for (size_t k = 0; k < p->kernel_count; k++)
             alb_scatter_kernel_free(&p->kernels[k]);
         free(p->kernels);
+        free(p->totals);
         free(p->of_bodies);
         free(p->self);
         free_paths(p);
@@ -300,20 +304,20 @@ static void write_local(alb_scatter *scatter, const alb_surface *surfaces)
     }
 }
 
-// A product with even light.
-static bool sum_rows(alb_scatter *scatter, alb_error *error)
+static const unsigned both_sides = 1U << ALB_REFLECTION | 1U << ALB_TRANSMISSION;
+
+void alb_scatter_sum_rows(alb_scatter *scatter)
 {
-    double(*ones)[3] = alb_allocate(scatter->patch_count, sizeof *ones, error);
-    if (!ones)
-        return false;
-    for (size_t i = 0; i < scatter->patch_count; i++)
-        for (int c = 0; c < 3; c++)
-            ones[i][c] = 1;
-    alb_scatter_apply(scatter->row_sums, scatter, (const double(*)[3])ones);
-    scatter->columns_known = false;
-    free(ones);
-    return true;
+    alb_scatter_parts *p = scatter->parts;
+    if (p->rows_known)
+        return;
+    memcpy(scatter->row_sums, scatter->local, scatter->patch_count * sizeof *scatter->local);
+    alb_forest_gather(&p->forest, NULL);
+    alb_product_add(scatter->row_sums, NULL, &p->links, &p->forest, p->kernels, both_sides);
+    p->rows_known = true;
 }
+
+bool alb_scatter_rows_known(const alb_scatter *scatter) { return scatter->parts->rows_known; }
 
 // The transposed product with the areas.
 bool alb_scatter_sum_columns(alb_scatter *scatter, alb_error *error)
@@ -326,7 +330,45 @@ bool alb_scatter_sum_columns(alb_scatter *scatter, alb_error *error)
                alb_product_add_columns(scatter->column_sums, &p->links, &p->forest, p->kernels, error);
 }
 
-bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_error *error)
+static double total_of(const alb_scatter_kernel *kernel, const alb_surface *surfaces, int channel)
+{
+    return alb_profile_total(&surfaces[kernel->surface].profiles[kernel->side][channel]);
+}
+
+// What a body of the tree's material sends out in all, over what it sent by the totals before; infinite where
+// that was nothing.
+static double ratio_of(const alb_scatter_parts *p, const alb_tree *tree, const alb_surface *surfaces, int channel)
+{
+    double now = 0, before = 0;
+    for (size_t k = 0; k < p->kernel_count; k++)
+        if (p->kernels[k].surface == tree->surface) {
+            now += total_of(&p->kernels[k], surfaces, channel);
+            before += p->totals[k][channel];
+        }
+    return before > 0 ? now / before : now > 0 ? HUGE_VAL : 1;
+}
+
+// Row sums as the totals of the profiles let expect. False where they do not.
+static bool estimate_rows(alb_scatter *scatter, const alb_surface *surfaces)
+{
+    const alb_scatter_parts *p = scatter->parts;
+    for (size_t i = 0; i < scatter->patch_count; i++)
+        if (!surfaces[p->materials[i]].scatters)
+            memcpy(scatter->row_sums[i], scatter->local[i], sizeof *scatter->local);
+    for (size_t t = 0; t < p->forest.tree_count; t++) {
+        const alb_tree *tree = &p->forest.trees[t];
+        for (int c = 0; c < 3; c++) {
+            const double ratio = ratio_of(p, tree, surfaces, c);
+            if (!isfinite(ratio))
+                return false;
+            for (uint32_t leaf = tree->first_leaf; leaf < tree->first_leaf + tree->leaf_count; leaf++)
+                scatter->row_sums[p->forest.patches[leaf]][c] *= ratio;
+        }
+    }
+    return true;
+}
+
+bool alb_scatter_rewrite_tables(alb_scatter *scatter, const alb_surface *surfaces, alb_error *error)
 {
     alb_scatter_parts *p = scatter->parts;
     if (!check_surfaces(scatter, surfaces, error))
@@ -336,22 +378,42 @@ bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_
         alb_scatter_kernel_write(&p->kernels[k], surfaces[p->kernels[k].surface].profiles[p->kernels[k].side]);
     alb_product_write_pairs(&p->links, p->kernels);
     write_local(scatter, surfaces);
-    return sum_rows(scatter, error);
+    const bool estimated = p->rows_known && estimate_rows(scatter, surfaces);
+    for (size_t k = 0; k < p->kernel_count; k++)
+        for (int c = 0; c < 3; c++)
+            p->totals[k][c] = total_of(&p->kernels[k], surfaces, c);
+    p->rows_known = scatter->columns_known = false;
+    if (!estimated)
+        alb_scatter_sum_rows(scatter);
+    return true;
+}
+
+bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_error *error)
+{
+    if (!alb_scatter_rewrite_tables(scatter, surfaces, error))
+        return false;
+    alb_scatter_sum_rows(scatter);
+    return true;
 }
 
 void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3])
 {
     alb_scatter_parts *p = scatter->parts;
+    double(*even)[3] = p->rows_known ? NULL : scatter->row_sums;
 #pragma omp parallel for schedule(static)
     for (size_t j = 0; j < scatter->patch_count; j++)
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++) {
             out[j][c] = scatter->local[j][c] * irradiance[j][c];
+            if (even)
+                even[j][c] = scatter->local[j][c];
+        }
     if (p->weights.blocks) {
         alb_weights_add(out, &p->weights, &p->forest, irradiance);
         return;
     }
     alb_forest_gather(&p->forest, irradiance);
-    alb_product_add(out, &p->links, &p->forest, p->kernels, 1U << ALB_REFLECTION | 1U << ALB_TRANSMISSION);
+    alb_product_add(out, even, &p->links, &p->forest, p->kernels, both_sides);
+    p->rows_known = true;
 }
 
 bool alb_scatter_keep_weights(alb_scatter *scatter, double error_wanted, double *error_percent, alb_error *error)
@@ -359,6 +421,7 @@ bool alb_scatter_keep_weights(alb_scatter *scatter, double error_wanted, double 
     alb_scatter_parts *p = scatter->parts;
     const double(*sums)[3] = (const double(*)[3])scatter->row_sums, (*local)[3] = (const double(*)[3])scatter->local;
     alb_weights made;
+    alb_scatter_sum_rows(scatter);
     if (!alb_weights_create(&made, &p->links, &p->forest, p->kernels, sums, local, error_wanted, error))
         return false;
     if (error_percent && !alb_weights_error(error_percent, &made, &p->links, &p->forest, p->kernels, local,
@@ -376,7 +439,7 @@ void alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, cons
     alb_scatter_parts *p = scatter->parts;
     memset(out, 0, scatter->patch_count * sizeof *out);
     alb_forest_gather(&p->forest, irradiance);
-    alb_product_add(out, &p->links, &p->forest, p->kernels, 1U << ALB_TRANSMISSION);
+    alb_product_add(out, NULL, &p->links, &p->forest, p->kernels, 1U << ALB_TRANSMISSION);
 }
 
 bool alb_scatter_sample(uint32_t *sources, const alb_scatter *scatter, const uint32_t *first, int channel,

@@ -48,6 +48,11 @@ void alb_scatter_free(alb_scatter *scatter);
 // error holds for profiles as wide as those of the creation or wider; with narrower ones it grows as the ratio squared.
 // ALB_BAD_DATA where a surface scatters that was opaque or the other way round, or became a slab: create anew.
 bool alb_scatter_rewrite(alb_scatter *scatter, const alb_surface *surfaces, alb_error *error);
+// The same, and quicker: row sums are what the profiles' totals let expect of the last ones, until the next
+// alb_scatter_apply has found them beside its product, or alb_scatter_sum_rows.
+bool alb_scatter_rewrite_tables(alb_scatter *scatter, const alb_surface *surfaces, alb_error *error);
+bool alb_scatter_rows_known(const alb_scatter *scatter);
+void alb_scatter_sum_rows(alb_scatter *scatter);
 // The column sums after a rewrite, which leaves them as they were; nothing to do where they are known.
 bool alb_scatter_sum_columns(alb_scatter *scatter, alb_error *error);
 // out = S' irradiance, RGB; out and irradiance have patch_count rows and are not the same.

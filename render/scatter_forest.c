@@ -149,9 +149,10 @@ static void merge(alb_cluster *cluster, const alb_cluster *left, const alb_clust
 // What a product needs of a cluster: of a node, or of a leaf.
 static void keep(alb_forest *forest, const alb_cluster *cluster, alb_scatter_node *node, uint32_t leaf)
 {
-    if (node)
+    if (node) {
         node->light[3] = cluster->spread_mm2;
-    else
+        forest->node_areas_mm2[node - forest->nodes] = cluster->area_mm2;
+    } else
         forest->lights[leaf][3] = cluster->spread_mm2;
     for (int k = 0; k < 3; k++)
         *(node ? &node->moments[k][3] : &forest->centres_mm[leaf][k]) = cluster->centre_mm[k];
@@ -225,6 +226,7 @@ bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_p
     if (!(forest->trees = alb_allocate(ALB_FACES * bodies->count, sizeof *forest->trees, error)) ||
         !(forest->patches = alb_allocate(leaves, sizeof *forest->patches, error)) ||
         !(forest->areas_mm2 = alb_allocate(leaves, sizeof *forest->areas_mm2, error)) ||
+        !(forest->node_areas_mm2 = alb_allocate(leaves, sizeof *forest->node_areas_mm2, error)) ||
         !(forest->centres_mm = alb_allocate(leaves, sizeof *forest->centres_mm, error)) ||
         !(forest->lights = alb_allocate(leaves, sizeof *forest->lights, error)) ||
         !(forest->nodes = alb_allocate(leaves, sizeof *forest->nodes, error)) ||
@@ -252,6 +254,7 @@ void alb_forest_free(alb_forest *forest)
     free(forest->trees);
     free(forest->patches);
     free(forest->areas_mm2);
+    free(forest->node_areas_mm2);
     free(forest->centres_mm);
     free(forest->lights);
     free(forest->nodes);
@@ -262,7 +265,7 @@ void alb_forest_free(alb_forest *forest)
 size_t alb_forest_bytes(const alb_forest *forest)
 {
     return forest->tree_count * sizeof *forest->trees +
-           forest->leaf_count * (sizeof *forest->patches + sizeof *forest->areas_mm2 + sizeof *forest->centres_mm +
+           forest->leaf_count * (sizeof *forest->patches + 2 * sizeof *forest->areas_mm2 + sizeof *forest->centres_mm +
                                  sizeof *forest->lights + sizeof *forest->nodes) +
            (forest->clusters ? forest->cluster_count * sizeof *forest->clusters : 0);
 }
@@ -286,7 +289,8 @@ static void gather(alb_forest *forest, const double (*irradiance)[3], uint32_t n
                    uint32_t count)
 {
     if (count == 1) {
-        const double area = (double)forest->areas_mm2[first_leaf], *light = irradiance[forest->patches[first_leaf]];
+        const double area = (double)forest->areas_mm2[first_leaf];
+        const double *light = irradiance ? irradiance[forest->patches[first_leaf]] : (const double[3]){1, 1, 1};
         for (int c = 0; c < 3; c++)
             forest->lights[first_leaf][c] = (float)(area * light[c]);
         return;

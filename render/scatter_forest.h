@@ -41,6 +41,7 @@ typedef struct alb_forest {
     alb_tree *trees;
     uint32_t *patches;       // of the leaves
     float *areas_mm2;        // of the leaves
+    float *node_areas_mm2;   // of the nodes
     float (*centres_mm)[3];  // of the leaves, as those of clusters
     float (*lights)[4];      // of the leaves: light of R, G and B, and the spread; workspace of a product
     alb_scatter_node *nodes; // likewise
@@ -59,6 +60,6 @@ bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_p
 void alb_forest_free(alb_forest *forest);
 // Covariance of a point of the triangle, in the order of alb_cluster.
 void alb_moments_of_triangle(float moments[6], alb_vector a, alb_vector b, alb_vector c);
-// Fills lights and nodes from the irradiance of the patches.
+// Fills lights and nodes from the irradiance of the patches; NULL: one everywhere.
 void alb_forest_gather(alb_forest *forest, const double (*irradiance)[3]);
 size_t alb_forest_bytes(const alb_forest *forest);

@@ -63,6 +63,18 @@ static inline __attribute__((always_inline)) float4 by_extent(const float bend[8
     return second + 0.4F * second * second;
 }
 
+// What the first moments of a node's light add.
+static inline __attribute__((always_inline)) float4 by_moments(const alb_scatter_node *node, const float bend[8],
+                                                               const int8_t direction[4])
+{
+    byte4 bytes;
+    memcpy(&bytes, direction, sizeof bytes);
+    const float4 to = __builtin_convertvector(bytes, float4);
+    const float4 along =
+        to[0] * load(node->moments[0]) + to[1] * load(node->moments[1]) + to[2] * load(node->moments[2]);
+    return load(bend) * (1.0F / INT8_MAX) * along;
+}
+
 // Nodes: light and its moments.
 static inline __attribute__((always_inline)) void add_nodes(double sums[ALB_BLOCK][3], const stretch *run, bool near)
 {
@@ -72,13 +84,8 @@ static inline __attribute__((always_inline)) void add_nodes(double sums[ALB_BLOC
     for (size_t k = 0; k < run->count; k++, codes += ALB_BLOCK) {
         const float *bend = run->bends[*codes++];
         node += run->deltas[k];
-        byte4 bytes;
-        memcpy(&bytes, run->directions[k], sizeof bytes);
-        const float4 to = __builtin_convertvector(bytes, float4), light = load(node->light);
-        const float4 along =
-            to[0] * load(node->moments[0]) + to[1] * load(node->moments[1]) + to[2] * load(node->moments[2]);
-        const float4 moved = light + load(bend) * (1.0F / INT8_MAX) * along;
-        const float spread = to[3] * (1.0F / 64) * node->light[3];
+        const float4 light = load(node->light), moved = light + by_moments(node, bend, run->directions[k]);
+        const float spread = (float)run->directions[k][3] * (1.0F / 64) * node->light[3];
         if (near)
             add_near_rows(rows, run, codes, moved, light * spread);
         else
@@ -138,6 +145,75 @@ static void add_run(double sums[ALB_BLOCK][3], const stretch *run)
         add_shares(sums, run, ALB_LINK_EIGHTHS);
 }
 
+typedef float float8 __attribute__((vector_size(32)));
+
+static inline __attribute__((always_inline)) void put_twice(float8 *out, const float values[4])
+{
+    const float4 once = load(values);
+    *out = __builtin_shufflevector(once, once, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+// What a link's source sends, and beside it what it would send of even light: its area, which has no moments; what
+// bends add to both where rows have their own.
+static inline __attribute__((always_inline)) void take_source(float8 *lit, float8 *bent, const stretch *run, size_t k,
+                                                              size_t at, const float bend[8], bool node, bool near)
+{
+    const alb_forest *forest = run->forest;
+    const float4 light = load(node ? forest->nodes[at].light : forest->lights[at]);
+    const float area = node ? forest->node_areas_mm2[at] : forest->areas_mm2[at],
+                spread = node ? (float)run->directions[k][3] * (1.0F / 64) * light[3] : light[3];
+    const float4 moved = node ? light + by_moments(&forest->nodes[at], bend, run->directions[k]) : light;
+    const float4 zero = {0}, whole = {area, area, area, 0};
+    float4 extent = node ? by_extent(bend, spread) : load(bend + 4) * spread;
+    extent = near || run->kind > ALB_LINK_NEAR_PATCH ? zero : extent;
+    *lit = __builtin_shufflevector(moved + light * extent, whole + whole * extent, 0, 1, 2, 3, 4, 5, 6, 7);
+    *bent = __builtin_shufflevector(light * spread, whole * spread, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+static inline __attribute__((always_inline)) void add_both(double sums[ALB_BLOCK][3], double evens[ALB_BLOCK][3],
+                                                           const stretch *run, bool node, bool near)
+{
+    float8 rows[ALB_BLOCK] = {{0}};
+    const uint8_t *codes = run->codes;
+    size_t at = run->first;
+    for (size_t k = 0; k < run->count; k++) {
+        float8 lit, bent;
+        at += run->deltas[k];
+        take_source(&lit, &bent, run, k, at, run->bends[*codes], node, near);
+        codes += alb_link_bend_bytes(run->kind);
+        for (int code = 0; code < alb_link_codes(run->kind); code++, codes += ALB_BLOCK) {
+            const float8 share = lit * alb_link_share(run->kind, code);
+#pragma GCC unroll 8
+            for (int row = 0; row < ALB_BLOCK; row++) {
+                float8 value, bends;
+                put_twice(&value, run->values[codes[row]]);
+                if (near)
+                    put_twice(&bends, run->bends[codes[row]] + 4);
+                rows[row] += value * (near ? share + bends * bent : share);
+            }
+        }
+    }
+    for (int row = 0; row < ALB_BLOCK; row++)
+        for (int c = 0; c < 3; c++) {
+            sums[row][c] += (double)rows[row][c];
+            evens[row][c] += (double)rows[row][4 + c];
+        }
+}
+
+// As add_run, and the same of even light.
+ALB_VECTOR_CLONES
+static void add_run_both(double sums[ALB_BLOCK][3], double evens[ALB_BLOCK][3], const stretch *run)
+{
+    if (run->kind == ALB_LINK_NODE)
+        add_both(sums, evens, run, true, false);
+    else if (run->kind == ALB_LINK_NEAR_NODE)
+        add_both(sums, evens, run, true, true);
+    else if (run->kind == ALB_LINK_NEAR_PATCH)
+        add_both(sums, evens, run, false, true);
+    else
+        add_both(sums, evens, run, false, false);
+}
+
 static stretch begin(const alb_link_block *block, const alb_forest *forest)
 {
     return (stretch){.forest = forest,
@@ -165,12 +241,14 @@ static void pass(stretch *at)
     at->directions += at->kind <= ALB_LINK_NEAR_NODE ? at->count : 0;
 }
 
-static void add_pairs(double sums[ALB_BLOCK][3], const alb_link_block *block, const alb_forest *forest,
-                      const alb_scatter_kernel *kernels, unsigned sides)
+static void add_pairs(double sums[ALB_BLOCK][3], double evens[ALB_BLOCK][3], const alb_link_block *block,
+                      const alb_forest *forest, const alb_scatter_kernel *kernels, unsigned sides)
 {
     for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++)
-        for (int c = 0; c < 3 && sides & 1U << kernels[pair->kernel].side; c++)
+        for (int c = 0; c < 3 && sides & 1U << kernels[pair->kernel].side; c++) {
             sums[pair->row][c] += (double)(pair->weights[c] * forest->lights[pair->leaf][c]);
+            evens[pair->row][c] += (double)(pair->weights[c] * forest->areas_mm2[pair->leaf]);
+        }
 }
 
 void alb_product_write_pairs(const alb_links *links, const alb_scatter_kernel *kernels)
@@ -186,23 +264,30 @@ void alb_product_write_pairs(const alb_links *links, const alb_scatter_kernel *k
         }
 }
 
-void alb_product_add(double (*out)[3], const alb_links *links, const alb_forest *forest,
+void alb_product_add(double (*out)[3], double (*even)[3], const alb_links *links, const alb_forest *forest,
                      const alb_scatter_kernel *kernels, unsigned sides)
 {
 #pragma omp parallel for schedule(dynamic, 16)
     for (size_t b = 0; b < links->block_count; b++) {
         const alb_link_block *block = &links->blocks[b];
-        double sums[ALB_BLOCK][3] = {{0}};
+        double sums[ALB_BLOCK][3] = {{0}}, evens[ALB_BLOCK][3] = {{0}};
         stretch at = begin(block, forest);
         for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; pass(&at), run++) {
             take(&at, run, kernels);
-            if (sides & 1U << kernels[run->kernel].side)
+            if (!(sides & 1U << kernels[run->kernel].side))
+                continue;
+            if (even)
+                add_run_both(sums, evens, &at);
+            else
                 add_run(sums, &at);
         }
-        add_pairs(sums, block, forest, kernels, sides);
+        add_pairs(sums, evens, block, forest, kernels, sides);
         for (uint32_t row = 0; row < block->row_count; row++)
-            for (int c = 0; c < 3; c++)
+            for (int c = 0; c < 3; c++) {
                 out[forest->patches[block->first_leaf + row]][c] += sums[row][c];
+                if (even)
+                    even[forest->patches[block->first_leaf + row]][c] += evens[row][c];
+            }
     }
 }
 

@@ -9,6 +9,8 @@
 //
 // Nothing of this depends on the profile: distances and weights stay, a change of profile is table look-ups.
 #include "render/scatter_rule.h"
+#include "base/vector_clones.h"
+#include <string.h>
 
 enum { PER_EDGE = (ALB_RULE_NODES - 1) / 3, WHOLE_CODE = UINT16_MAX, WHOLE_TURN = INT16_MAX };
 
@@ -56,17 +58,22 @@ void alb_rule_find(alb_rule *rule, const alb_vector triangle[3], alb_vector p, d
     rule->codes[ALB_RULE_NODES - 1] = (uint16_t)lrint(fmin(sqrt(fabs(height) / near_mm), 1) * WHOLE_CODE);
 }
 
+ALB_VECTOR_CLONES
 void alb_rule_apply(double integral[3], const alb_rule *rule, const alb_scatter_kernel *kernel)
 {
-    integral[0] = integral[1] = integral[2] = 0;
+    typedef float float4 __attribute__((vector_size(16)));
+    typedef double double4 __attribute__((vector_size(32)));
+    const double whole = 2 * M_PI / WHOLE_TURN * kernel->near_mm;
+    double4 sum = {0};
     for (int k = 0; k < ALB_RULE_NODES; k++) {
-        const double u = (double)rule->codes[k] / WHOLE_CODE, at = u * ALB_DISC_KNOTS;
+        const double u = (double)rule->codes[k] * (1.0 / WHOLE_CODE), at = u * ALB_DISC_KNOTS;
         const int knot = at < ALB_DISC_KNOTS ? (int)at : ALB_DISC_KNOTS - 1;
-        const double weight = 2 * M_PI * (double)rule->weights[k] / WHOLE_TURN * u * u * kernel->near_mm;
-        const float *low = kernel->discs[knot], *high = kernel->discs[knot + 1];
-        for (int c = 0; c < 3; c++)
-            integral[c] += weight * ((double)low[c] + (at - knot) * ((double)high[c] - (double)low[c]));
+        float4 knots[2];
+        memcpy(knots, kernel->discs[knot], sizeof knots);
+        const double4 low = __builtin_convertvector(knots[0], double4),
+                      high = __builtin_convertvector(knots[1], double4);
+        sum += whole * (double)rule->weights[k] * u * u * (low + (at - knot) * (high - low));
     }
     for (int c = 0; c < 3; c++)
-        integral[c] = fmax(0, integral[c]); // quadrature noise where the profile has died away
+        integral[c] = fmax(0, sum[c]); // quadrature noise where the profile has died away
 }

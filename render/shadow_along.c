@@ -3,9 +3,11 @@
 //     O(x, d) = O_e(d),      t = -b - sqrt(R^2 - m^2),  b = (x - C).d,  m^2 = |x - C|^2 - b^2
 // No scaling, no silhouette is guessed, and a line that misses the object's bounding sphere meets nothing: O fades out
 // between that sphere and the nodes'. This is the light field of Levoy and Hanrahan 1996, of order 6 x cells^2 nodes.
-// From inside the nodes' sphere there is no such e; there the angular scaling of Wang et al. 2006 is applied to the
-// direction itself, O(x, d) = O_r(tau(theta), phi), r in the receiver's direction, tau of the cone map with 45 degrees
-// (sh_map.h), without a matrix and what a matrix cuts off; where there are shells inside, between the two around x.
+// From inside the nodes' sphere e lies behind x. Where nothing of the object does, as below a ground that receives, it
+// serves too, if x comes before the middle of the line's way through the sphere. Else the angular scaling of Wang et
+// al. 2006 is applied to the direction itself, O(x, d) = O_r(tau(theta), phi), r in the receiver's direction, tau of
+// the cone map with 45 degrees (sh_map.h), without a matrix and what a matrix cuts off; where there are shells inside,
+// between the two around x.
 //
 // Stops being true: order n of the sample blurs silhouettes by 180 / n degrees as seen from e, the interpolation
 // between nodes by what it takes e to move from one to the next.
@@ -13,7 +15,8 @@
 #include "base/vector_clones.h"
 #include "render/sh_product.h"
 
-enum { BLOCK = ALB_SHADOW_BLOCK, LOOKS = 2 * BLOCK };
+enum { BLOCK = ALB_SHADOW_BLOCK, LOOKS = 3 * BLOCK };
+#define BEFORE 0.2 // radii before the middle, along a line, from where all of the object counts as ahead
 
 // A sample and a direction in it.
 typedef struct looks {
@@ -60,19 +63,21 @@ static void add_inner(looks *l, size_t receiver, const alb_shadow_field *field, 
         add(l, receiver, above - 1, keep * (1 - t), out, mapped(axis, d, x / low));
 }
 
-static void add_line(looks *l, size_t receiver, const alb_shadow_field *field, alb_vector point, alb_vector d)
+static void add_line(looks *l, size_t receiver, const alb_shadow_field *field, alb_vector point, alb_vector d,
+                     bool apart)
 {
     const int first = field->settings.inner;
     const double nodes = field->shells[first].radius;
     const alb_vector off = alb_times(1 / field->sphere.radius_mm, alb_sub(point, field->sphere.centre_mm));
     const double b = alb_dot(off, d), square = alb_dot(off, off), missed = fmax(square - b * b, 0);
     const double nearest = sqrt(b < 0 ? missed : square), keep = fmin((nodes - nearest) / (nodes - 1), 1);
+    const double through = square >= nodes * nodes ? 1 : apart ? fmin(fmax(-b / BEFORE, 0), 1) : 0;
     if (!(keep > 0))
         return;
-    if (square < nodes * nodes)
-        add_inner(l, receiver, field, off, sqrt(square), d, keep);
-    else
-        add(l, receiver, first, keep, alb_add(off, alb_times(-b - sqrt(nodes * nodes - missed), d)), d);
+    if (through < 1)
+        add_inner(l, receiver, field, off, sqrt(square), d, keep * (1 - through));
+    if (through > 0)
+        add(l, receiver, first, keep * through, alb_add(off, alb_times(-b - sqrt(nodes * nodes - missed), d)), d);
 }
 
 // The squares of how near lines come to the middle, in radii.
@@ -87,7 +92,7 @@ ALB_VECTOR_CLONES static void find_nearest(float *restrict nearest, const float 
 }
 
 void alb_shadow_along(float *out, const alb_shadow_field *field, const alb_vector *points, const float *directions,
-                      const float *wanted, size_t count)
+                      const float *wanted, bool apart, size_t count)
 {
     float basis[ALB_SH_COUNT_MAX * LOOKS], sample[ALB_SH_COUNT_MAX], off[3 * BLOCK] = {0}, nearest[BLOCK];
     const double scale = 1 / field->sphere.radius_mm, nodes = field->shells[field->settings.inner].radius;
@@ -102,7 +107,8 @@ void alb_shadow_along(float *out, const alb_shadow_field *field, const alb_vecto
         if (wanted[r] > 0 && nearest[r] < 1.01F * (float)(nodes * nodes))
             add_line(
                 &l, r, field, points[r],
-                (alb_vector){(double)directions[r], (double)directions[BLOCK + r], (double)directions[2 * BLOCK + r]});
+                (alb_vector){(double)directions[r], (double)directions[BLOCK + r], (double)directions[2 * BLOCK + r]},
+                apart);
     if (!l.count)
         return;
     const int order = field->settings.order;

@@ -172,7 +172,8 @@ static void find_visible(float *visible, const glow *g, const alb_shadow_block *
     for (size_t o = 0; o < world->occluder_count; o++) {
         for (size_t r = 0; r < b->count; r++)
             lines[r] = b->own[r] != o ? wanted[r] : 0;
-        alb_shadow_along(occlusion, &world->occluders[o], b->raised[o], g->directions, lines, b->count);
+        alb_shadow_along(occlusion, &world->occluders[o], b->raised[o], g->directions, lines, world->surfaces != NULL,
+                         b->count);
         for (size_t r = 0; r < b->count; r++)
             if (occlusion[r] > 0)
                 visible[r] *= 1 - before(g, b, world, o, r, sphere) * occlusion[r];

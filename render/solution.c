@@ -247,14 +247,31 @@ bool alb_solution_relight(alb_solution *s, const alb_scene *scene, alb_error *er
     return relight(s, scene, true, error);
 }
 
+// Row sums come out of the first product of the solution: what creates light is refused after it, by its name, and the
+// radiosity is then what it was.
 bool alb_solution_rematerial(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
+    const size_t n = s->patches.count;
     const double start_s = alb_clock_s();
-    const bool ok = alb_scatter_rewrite(&s->scatter, scene->surfaces, error) && check_scattering(s, scene, error);
+    double(*before)[3] = alb_allocate(n, sizeof *before, error);
+    bool ok = before && alb_scatter_rewrite_tables(&s->scatter, scene->surfaces, error);
     s->seconds[ALB_STAGE_SCATTERING] = alb_clock_s() - start_s;
-    if (ok)
+    if (ok) {
+        alb_error solving = {0};
+        memcpy(before, s->radiosity, n * sizeof *before);
         alb_radiosity_refresh(&s->equations);
-    return ok && relight(s, scene, false, error);
+        ok = relight(s, scene, false, &solving);
+        alb_scatter_sum_rows(&s->scatter);
+        alb_radiosity_refresh(&s->equations);
+        if (!check_scattering(s, scene, error))
+            ok = false;
+        else if (!ok)
+            *error = solving;
+        if (!ok)
+            memcpy(s->radiosity, before, n * sizeof *before);
+    }
+    free(before);
+    return ok;
 }
 
 static bool run_stage(alb_solution *s, alb_stage stage, const alb_scene *scene, alb_error *error)

@@ -255,6 +255,46 @@ static void products_are_few_in_random_rooms(void **state)
     }
 }
 
+// Row sums found beside the first product are those found apart (both sum weights in single precision), after any
+// change: other widths and totals, none at all, and back. The residual that is stated stays a bound.
+static void materials_change_beside_a_product(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_scene scene;
+    alb_solution s;
+    begin(&scene, 2, 64, 1e-4);
+    room_with_ball(&scene, 8);
+    scene.light_count = 2;
+    const alb_surface changes[] = {wax(0.8, 0.3), wax(0.8, 0.6), wax(0.5, 0.2), wax(0, 0.2), wax(0.9, 0.25)};
+    scene.surfaces[0] = diffuse(0.5, 0.6, 0.8), scene.surfaces[1] = wax(0.7, 0.4);
+    check_ok(alb_solution_create(&s, &scene, &error), &error);
+    const size_t n = s.patches.count;
+    alb_rgb *sums = calloc(n, sizeof *sums);
+    for (size_t k = 0; k < sizeof changes / sizeof *changes; k++) {
+        scene.surfaces[1] = changes[k];
+        scene.surfaces[0].reflectance[1] = 0.1 * (double)k;
+        check_ok(alb_solution_rematerial(&s, &scene, &error), &error);
+        check_below(residual_of(&s), s.report.residual);
+        memcpy(sums, s.scatter.row_sums, n * sizeof *sums);
+        check_ok(alb_scatter_rewrite(&s.scatter, scene.surfaces, &error), &error);
+        for (size_t p = 0; p < n; p++)
+            for (int c = 0; c < 3; c++)
+                check_near(sums[p][c], s.scatter.row_sums[p][c], 2e-6);
+    }
+    // refused by its name, and the light stays what it was
+    memcpy(sums, s.radiosity, n * sizeof *sums);
+    scene.surfaces[1] = wax(1.3, 0.25);
+    snprintf(scene.surfaces[1].name, sizeof scene.surfaces[1].name, "glow-worm");
+    check_fails(alb_solution_rematerial(&s, &scene, &error), &error, ALB_BAD_DATA, "glow-worm");
+    assert_memory_equal(sums, s.radiosity, n * sizeof *sums);
+    scene.surfaces[1] = changes[0];
+    check_ok(alb_solution_rematerial(&s, &scene, &error), &error);
+    free(sums);
+    alb_solution_free(&s);
+    alb_scene_free(&scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -264,6 +304,7 @@ int main(void)
         cmocka_unit_test(two_concentric_spheres),
         cmocka_unit_test(products_are_few_at_any_albedo),
         cmocka_unit_test(products_are_few_in_random_rooms),
+        cmocka_unit_test(materials_change_beside_a_product),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

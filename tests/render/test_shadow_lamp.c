@@ -310,6 +310,58 @@ static void receiver_crosses_the_bounding_sphere(void **state)
     alb_mesh_free(&mesh);
 }
 
+// Below two balls that are one object, within their common sphere: as points of another surface, of which the object
+// hides nothing behind them, and as any points, by the cone map of directions.
+static void receivers_inside_the_sphere(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_mesh balls = {0}, lamp = {0};
+    const alb_vector at = {0, 0, 12}, up = {0, 0, 1};
+    for (int side = -1; side <= 1; side += 2) {
+        alb_mesh ball = {0};
+        check_ok(alb_shape_sphere(&ball, &(alb_sphere){{3 * side, 0, 4}, 1, 3, false}, &error), &error);
+        check_ok(alb_mesh_append(&balls, &ball, 1, (alb_vector){0}, &error), &error);
+        alb_mesh_free(&ball);
+    }
+    make_sheet(&lamp, at, 2);
+    stage *s = new_stage(&lamp, NULL);
+    add_occluder(s, &balls, ALB_SH_ORDER_MAX);
+    alb_tracer tracer;
+    check_ok(alb_tracer_create(&tracer, &balls, &error), &error);
+    const alb_shadow_surface none = {0};
+    const size_t first = 0;
+    s->world.first_vertices = &first;
+    for (int apart = 0; apart < 2; apart++) {
+        double sum = 0, lost = 0, mean = 0;
+        int count = 0;
+        s->world.surfaces = apart ? &none : NULL; // without probes
+        for (double x = -3; x <= 3; x += 0.25)
+            for (double z = 1.5; z < 3; z += 0.5, count++) {
+                const alb_vector p = {x, 0.2, z};
+                double truth = 0, open = 0;
+                float found[3];
+                for (int i = 0; i < 400; i++) {
+                    const alb_vector y = {(i % 20 + 0.5) / 5 - 2, (i / 20 + 0.5) / 5 - 2, at.z}, to = alb_sub(y, p);
+                    const double e = to.z * to.z / pow(alb_dot(to, to), 2) * 16 / 400;
+                    open += e;
+                    truth += alb_tracer_blocked(&tracer, p, y) ? 0 : e;
+                }
+                irradiance(found, s, p, up);
+                sum += pow((double)found[0] - truth, 2);
+                lost += pow(open - truth, 2);
+                mean += truth;
+            }
+        print_message("inside the sphere, %s: rms %.3f of the mean, the shadow %.3f\n", apart ? "apart" : "anywhere",
+                      sqrt(sum * count) / mean, sqrt(lost * count) / mean);
+        check_below(sum, (apart ? 0.15 : 0.3) * lost); // one shell; .58 of the mean without the map
+    }
+    alb_tracer_free(&tracer);
+    free_stage(s);
+    alb_mesh_free(&balls);
+    alb_mesh_free(&lamp);
+}
+
 // Where no line to the light meets the occluder's sphere it has no effect at all; lengths have no scale; the bytes do
 // not depend on threads.
 static void laws(void **state)
@@ -473,6 +525,7 @@ int main(void)
         cmocka_unit_test(light_hides_itself),
         cmocka_unit_test(light_inside_the_occluders_sphere),
         cmocka_unit_test(receiver_crosses_the_bounding_sphere),
+        cmocka_unit_test(receivers_inside_the_sphere),
         cmocka_unit_test(object_shades_itself),
         cmocka_unit_test(laws),
         cmocka_unit_test(aimed_rays),
