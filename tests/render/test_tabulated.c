@@ -6,27 +6,33 @@
 
 static const char csv[] = "test_tabulated_scene.csv", json[] = "test_tabulated_scene.json";
 
-static void write_table(const alb_profile *of, double step_mm, int lines)
+static void write_table_to(const char *path, const alb_profile *of, double step_mm, int lines)
 {
     alb_error error = {0};
     alb_text text = {0};
     alb_text_add(&text, "r_mm,value_per_mm2\n");
     for (int i = 0; i < lines; i++)
         alb_text_add(&text, "%.9g,%.9g\n", i * step_mm, alb_profile_value(of, i * step_mm));
-    check_ok(alb_file_write_text(csv, &text, &error), &error);
+    check_ok(alb_file_write_text(path, &text, &error), &error);
     alb_text_free(&text);
+}
+
+static void write_table(const alb_profile *of, double step_mm, int lines) { write_table_to(csv, of, step_mm, lines); }
+
+static void add_scene(alb_text *text, const char *tabulated)
+{
+    alb_text_add(text, "{\"format\":1,\"objects\":[{\"shape\":\"box\",\"size_mm\":[40,40,10],\"centre_mm\":[0,0,0],"
+                       "\"cells\":[20,20,5],\"material\":\"m\"}],\"materials\":{\"m\":{\"tabulated\":{");
+    alb_text_add(text, "%s", tabulated);
+    alb_text_add(text, "}}},\"camera\":{\"position_mm\":[0,0,100],\"look_at_mm\":[0,0,0],\"up\":[0,1,0],"
+                       "\"vertical_field_deg\":12,\"width\":9,\"height\":9}}");
 }
 
 static bool read_scene(alb_scene *scene, const char *tabulated, alb_error *error)
 {
     alb_provenance provenance = {0};
     alb_text text = {0};
-    alb_text_add(&text,
-                 "{\"format\":1,\"objects\":[{\"shape\":\"box\",\"size_mm\":[40,40,10],\"centre_mm\":[0,0,0],"
-                 "\"cells\":[20,20,5],\"material\":\"m\"}],\"materials\":{\"m\":{\"tabulated\":{%s}}},"
-                 "\"camera\":{\"position_mm\":[0,0,100],\"look_at_mm\":[0,0,0],\"up\":[0,1,0],"
-                 "\"vertical_field_deg\":12,\"width\":9,\"height\":9}}",
-                 tabulated);
+    add_scene(&text, tabulated);
     check_ok(alb_file_write_text(json, &text, error), error);
     alb_text_free(&text);
     const bool ok = alb_scene_read(scene, &provenance, json, error);
@@ -75,6 +81,35 @@ static void a_table_scatters_as_its_exponential(void **state)
     }
     free(in);
     alb_patches_free(&patches);
+    alb_scene_free(&scene);
+}
+
+// Six files, each an exponential of its own.
+static void each_channel_and_face_has_its_file(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_provenance provenance = {0};
+    alb_scene scene;
+    alb_text text = {0};
+    char names[6][32];
+    for (int k = 0; k < 6; k++) {
+        snprintf(names[k], sizeof names[k], "test_tabulated_%d.csv", k);
+        write_table_to(names[k], &(alb_profile){ALB_FORM_EXPONENTIAL, {0.001 * (k + 1), 0.3}}, 0.5, 60);
+    }
+    add_scene(&text, "\"reflection\":[\"test_tabulated_0.csv\",\"test_tabulated_1.csv\",\"test_tabulated_2.csv\"],"
+                     "\"transmission\":[\"test_tabulated_3.csv\",\"test_tabulated_4.csv\",\"test_tabulated_5.csv\"],"
+                     "\"thickness_mm\":10");
+    check_ok(alb_file_write_text(json, &text, &error), &error);
+    check_ok(alb_scene_read(&scene, &provenance, json, &error), &error);
+    assert_int_equal(provenance.input_count, 7);
+    for (int k = 0; k < 6; k++) {
+        const int side = k < 3 ? ALB_REFLECTION : ALB_TRANSMISSION;
+        check_relative(alb_profile_value(&scene.surfaces[0].profiles[side][k % 3], 0), 0.001 * (k + 1), 1e-8);
+        remove(names[k]);
+    }
+    remove(json);
+    alb_text_free(&text);
     alb_scene_free(&scene);
 }
 
@@ -129,6 +164,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_table_scatters_as_its_exponential),
         cmocka_unit_test(the_demonstration_is_its_dipole),
+        cmocka_unit_test(each_channel_and_face_has_its_file),
         cmocka_unit_test(what_is_wrong_is_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
