@@ -11,7 +11,9 @@
 #include "render/form_factor_cast.h"
 #include "base/random.h"
 
-static const double crack = 1e-5;   // radians
+static const double golden = 0.6180339887498949;
+static const double golden_cosine = -0.7373688780783199, golden_sine = -0.6754902942615236; // of 2 pi golden
+static const double crack = 1e-5;                                                           // radians
 static const double few = 1.0 / 16; // of a patch's rays: more that miss are an opening
 
 static double fraction(double x) { return x - floor(x); }
@@ -20,6 +22,7 @@ static double fraction(double x) { return x - floor(x); }
 typedef struct fan {
     alb_vector n, t, b;
     double s1, s2;
+    double cosine, sine; // of the azimuth of a lattice's next ray
     int rays;
 } fan;
 
@@ -33,20 +36,35 @@ static fan fan_of(const alb_ray_pattern *pattern, const alb_patches *patches, si
     return f;
 }
 
+static alb_vector cosine_weighted(const fan *f, double u, double cosine, double sine)
+{
+    const alb_vector in_plane = alb_add(alb_times(cosine, f->t), alb_times(sine, f->b));
+    return alb_add(alb_times(sqrt(1 - u), f->n), alb_times(sqrt(u), in_plane));
+}
+
 static alb_vector direction_of(const fan *f, const alb_ray_pattern *pattern, size_t patch, int q)
 {
     double u, v;
     if (pattern->sampling == ALB_SAMPLING_LATTICE) {
         u = fraction((q + 0.5) / f->rays + f->s1);
-        v = fraction(0.6180339887498949 * q + f->s2);
+        v = fraction(golden * q + f->s2);
     } else {
         alb_random random = alb_random_at(pattern->seed, 2 * patch, (uint64_t)q);
         u = alb_random_uniform(&random);
         v = alb_random_uniform(&random);
     }
-    const double side = sqrt(u), angle = 2 * M_PI * v;
-    const alb_vector in_plane = alb_add(alb_times(cos(angle), f->t), alb_times(sin(angle), f->b));
-    return alb_add(alb_times(sqrt(1 - u), f->n), alb_times(side, in_plane));
+    return cosine_weighted(f, u, cos(2 * M_PI * v), sin(2 * M_PI * v));
+}
+
+// Ray q after ray q - 1: azimuths of a lattice follow each other by the golden angle, without a cosine for each.
+static alb_vector direction_in_turn(fan *f, const alb_ray_pattern *pattern, size_t patch, int q)
+{
+    if (pattern->sampling != ALB_SAMPLING_LATTICE)
+        return direction_of(f, pattern, patch, q);
+    const double cosine = f->cosine, sine = f->sine;
+    f->cosine = golden_cosine * cosine - golden_sine * sine;
+    f->sine = golden_sine * cosine + golden_cosine * sine;
+    return cosine_weighted(f, fraction((q + 0.5) / f->rays + f->s1), cosine, sine);
 }
 
 alb_vector alb_ray_direction(const alb_ray_pattern *pattern, const alb_patches *patches, size_t patch, int q)
@@ -85,7 +103,7 @@ static alb_vector origin_of(alb_random *random, const alb_patches *patches, size
 size_t alb_rays_cast(uint32_t *hits, const alb_ray_pattern *pattern, const alb_patches *patches,
                      const alb_tracer *tracer, size_t patch)
 {
-    const fan f = fan_of(pattern, patches, patch);
+    fan f = fan_of(pattern, patches, patch);
     size_t missed = 0, slipped = 0;
     if (alb_patch_buried(patches, patch)) {
         for (int q = 0; q < f.rays; q++)
@@ -93,9 +111,10 @@ size_t alb_rays_cast(uint32_t *hits, const alb_ray_pattern *pattern, const alb_p
         return 0;
     }
     alb_random random = alb_random_at(pattern->seed, 2 * patch + 1, 0);
+    f.cosine = cos(2 * M_PI * f.s2), f.sine = sin(2 * M_PI * f.s2);
     for (int q = 0; q < f.rays; q++) {
         const alb_vector origin = origin_of(&random, patches, patch);
-        hits[q] = meet(patches, tracer, origin, direction_of(&f, pattern, patch, q));
+        hits[q] = meet(patches, tracer, origin, direction_in_turn(&f, pattern, patch, q));
         missed += hits[q] == patches->count;
     }
     if (missed == 0 || (double)missed > few * f.rays)

@@ -10,6 +10,7 @@
 
 enum { SWEEPS = 3, STEPS = 8 };
 static const double worth_moving = 1.02; // times the chord
+static const double little = 1e-4;       // of the length: steps that gain less are the last
 static const double flat_edge = 1e-4;    // radians: by as much of an edge's length corners are kept off the surface
 
 static double root_of(double x) { return x > 0 ? sqrt(x) : 0; }
@@ -119,7 +120,7 @@ static void move_on_lines(alb_bends *bends, const alb_cut *hull, int kept, const
         const double gained = length - length_of(bends);
         if (!(gained > 0))
             *bends = before;
-        if (!(gained > 1e-6 * length))
+        if (!(gained > little * length))
             break;
     }
 }
