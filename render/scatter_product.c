@@ -149,8 +149,8 @@ typedef float float8 __attribute__((vector_size(32)));
 
 static inline __attribute__((always_inline)) void put_twice(float8 *out, const float values[4])
 {
-    const float4 once = load(values);
-    *out = __builtin_shufflevector(once, once, 0, 1, 2, 3, 4, 5, 6, 7);
+    const float4 v = load(values);
+    *out = (float8){v[0], v[1], v[2], v[3], v[0], v[1], v[2], v[3]}; // spelt out: one instruction, a load
 }
 
 // What a link's source sends, and beside it what it would send of even light: its area, which has no moments; what
