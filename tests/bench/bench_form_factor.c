@@ -64,7 +64,7 @@ static bool build(bench *b, alb_error *error)
 
 static bool find_truth(bench *b, alb_error *error)
 {
-    const alb_ray_pattern pattern = {TRUTH_RAYS, 1000, ALB_SAMPLING_LATTICE};
+    const alb_ray_pattern pattern = {TRUTH_RAYS, 1000, ALB_SAMPLING_LATTICE, NULL};
     uint32_t *hits = calloc(TRUTH_RAYS, sizeof *hits);
     if (!hits)
         return alb_fail(error, ALB_NO_MEMORY, "out of memory for %d rays", TRUTH_RAYS);
@@ -95,7 +95,7 @@ static void measure(row *out, bench *b, const alb_form_factors *factors)
     }
     qsort(seconds, PRODUCTS, sizeof *seconds, by_value);
     out->product_ms = 1e3 * seconds[PRODUCTS / 2];
-    out->rays = (double)factors->rows.first[b->patches.count] / (double)b->patches.count;
+    out->rays = (double)alb_hit_rows_rays(&factors->rows) / (double)b->patches.count;
     out->bytes = (double)alb_form_factors_bytes(factors) / (double)b->patches.count;
     for (int c = 0; c < PATTERNS; c++) {
         double difference = 0, whole = 0;
