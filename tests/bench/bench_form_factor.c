@@ -22,7 +22,7 @@ enum {
     PRODUCTS = 9,
     REFINED = 3,
     SEEDS = 8,
-    FITTING = 228
+    FITTING = 227
 };
 
 static const int rays_of[SETTINGS] = {16, 64, 256, 1024};
