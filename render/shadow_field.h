@@ -28,7 +28,7 @@ typedef struct alb_shadow_settings {
                      // matter more than nodes do; occlusion only
     int rays;        // from each inner node
     int probes;      // on the object's own surface (shadow_surface.h), 0 to ALB_SHADOW_PROBES_MAX; occlusion only
-    bool packed;     // samples as bytes: a third of the memory at most, off by 1/254 of their largest coefficient
+    bool packed;     // samples as bytes: a third of the memory at order 4, off by 1/254 of their largest coefficient
     double cluster;  // vertices within about so many radii move as one in pictures from outside; 0: each for itself
 } alb_shadow_settings;
 // Order 4, 8 cells, 64 pixels, one shell at 1.1 radii, none inside or far, 256 rays, 1200 probes, 0.04.
