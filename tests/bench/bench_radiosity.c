@@ -128,7 +128,7 @@ static bool relight_narrowly(bench *b, alb_solution *s, alb_error *error)
     double seconds[RUNS];
     rgb *radiosity = alb_allocate(s->patches.count, sizeof *radiosity, error);
     const double start_s = alb_clock_s();
-    const bool ok = radiosity && alb_relight_create(&narrow, &s->equations, &s->patches, RANK, false, 3, error);
+    const bool ok = radiosity && alb_relight_create(&narrow, &s->equations, &s->patches, RANK, 3, error);
     if (ok) {
         b->narrow_made_s = alb_clock_s() - start_s;
         b->narrow_mb = (double)alb_relight_bytes(&narrow) / 1e6;
