@@ -1,18 +1,18 @@
 // With B = S'E + S'F B, the irradiance that patches send each other is G = F B = T E, T = (I - F S')^-1 F S', and
-//     B = S'(E + G),    G = F S'E + T2 E,    T2 = F S' T
-// (Sheng et al. 2014 precompute the whole inverse for this, n^2 numbers.) S'E stays exact: shadows have edges. What it
-// sends to other patches is known as well as need be from less:
-//     F S'E  ~=  P F_r S~ E
+//     B = S'(E + G),    G = F S'(E + G)
+// (Sheng et al. 2014 precompute the whole inverse for this, n^2 numbers.) S'(E + G) at last is exact: shadows have
+// edges. What patches send each other is known as well as need be from less:
+//     G  ~=  P F_r S~ (E + P g),    g = F_c S_c Q E + U V^T Q E
 // F_r: rays of the receivers, groups of patches on which G is even (relight_receivers.h), P: the same on each patch of
-// a group. S~ scatters between the clusters of the equations as the coarse level of the two-level solver does, and
-// keeps what varies within one where it is: F sees little of what it gets wrong (radiosity_two_level.c).
-//     T2  ~=  U V^T    randomised range finder (Halko, Martinsson & Tropp 2011, alg. 4.1)
-// U: means over clusters of Q, an orthonormal basis, in the inner product weighted by area, of T2 applied to random
+// a group. Q: means over the clusters of the equations' coarse level, F_c, S_c: bounces between these, S~: that which
+// scatters between clusters and keeps what varies within one where it is (radiosity_two_level.c). Each F sees little of
+// what the step before it got wrong. What is left, light that has bounced twice and more,
+//     T2 = F S' T  ~=  U V^T    by a randomised range finder (Halko, Martinsson & Tropp 2011, alg. 4.1)
+// U: means over clusters of an orthonormal basis, in the inner product weighted by area, of T2 applied to random
 // lights, one solution each. Lights and not white noise: that would find the sampling noise of F, which is most of the
-// rank and of which smooth light sees little. V: means over clusters of T2* of the columns of Q. T*, the adjoint in
-// that product, is S'F (I - S'F)^-1 by reciprocity, T* q = x - q with x = q + S'F x: another solution. T2 is narrow:
-// light has spread twice before the columns see it. Numbers are kept as 16-bit whole numbers of a step a column,
-// 1/32767 of the largest, rows side by side: a product reads U and V once.
+// rank and of which smooth light sees little. V: means over clusters of T2* of its columns. T*, the adjoint in that
+// product, is S'F (I - S'F)^-1 by reciprocity, T* q = x - q with x = q + S'F x: another solution. Numbers are kept as
+// 16-bit whole numbers of a step a column, 1/32767 of the largest, rows side by side: a product reads U and V once.
 //
 // Where it stops being true: light that a few large columns do not span falls outside Q; reciprocity holds for rays and
 // for sampled scattering only statistically. Both are in the stated error, which is measured.
@@ -70,12 +70,30 @@ static void project(float *factors, const alb_relight *r)
     }
 }
 
-// S~ E, as what receivers gather.
+// g, of the clusters, from Q E in r->even.
+static void bounce_coarsely(const alb_relight *r)
+{
+    const alb_clusters *clusters = &r->equations->clusters;
+    const size_t count = alb_relight_numbers(r);
+    float factors[3 * ALB_RELIGHT_RANK_MAX];
+    project(factors, r);
+    alb_clusters_scatter(r->sent, clusters, (const alb_rgb *)r->even);
+    alb_clusters_gather(r->bounced, clusters, (const alb_rgb *)r->sent);
+#pragma omp parallel for schedule(static)
+    for (size_t k = 0; k < clusters->count; k++) {
+        double later[3];
+        dot_row(later, r->u + k * count, factors, count);
+        for (int c = 0; c < 3; c++)
+            r->bounced[k][c] += r->even[k][c] + later[c];
+    }
+}
+
+// S~ (E + P g), as what receivers gather, from Q E + g in r->bounced.
 static void send_roughly(const alb_relight *r, const alb_rgb *irradiance)
 {
     const alb_clusters *clusters = &r->equations->clusters;
-    alb_clusters_scatter(r->sent, clusters, (const alb_rgb *)r->even);
-    for (size_t k = 0; k < clusters->count; k++) // of what even light sends, beside what is there
+    alb_clusters_scatter(r->sent, clusters, (const alb_rgb *)r->bounced);
+    for (size_t k = 0; k < clusters->count; k++) // as even light that sends it, less what is there
         for (int c = 0; c < 3; c++)
             r->sent[k][c] = (clusters->kept[k][c] > 0 ? r->sent[k][c] / clusters->kept[k][c] : 0) - r->even[k][c];
 #pragma omp parallel for schedule(static)
@@ -86,36 +104,19 @@ static void send_roughly(const alb_relight *r, const alb_rgb *irradiance)
     }
 }
 
-// E + G, with what the clusters get after the first bounce.
-static void add_bounces(const alb_relight *r, const alb_rgb *irradiance, const float *factors)
-{
-    const alb_clusters *clusters = &r->equations->clusters;
-    const alb_receivers *receivers = &r->receivers;
-    const size_t count = alb_relight_numbers(r);
-#pragma omp parallel
-    {
-#pragma omp for schedule(static)
-        for (size_t k = 0; k < clusters->count; k++)
-            dot_row(r->sent[k], r->u + k * count, factors, count);
-#pragma omp for schedule(static)
-        for (size_t k = 0; k < receivers->count; k++)
-            for (uint32_t i = receivers->first[k]; i < receivers->first[k + 1]; i++) {
-                const uint32_t p = receivers->members[i];
-                const double *later = r->sent[clusters->cluster[p]];
-                for (int c = 0; c < 3; c++)
-                    r->irradiance[p][c] = irradiance[p][c] + receivers->gathered[k][c] + later[c];
-            }
-    }
-}
-
 void alb_relight_apply(alb_rgb *radiosity, alb_relight *r, const alb_rgb *irradiance)
 {
-    float factors[3 * ALB_RELIGHT_RANK_MAX];
+    const alb_receivers *receivers = &r->receivers;
     alb_clusters_average(r->even, &r->equations->clusters, irradiance);
-    project(factors, r);
+    bounce_coarsely(r);
     send_roughly(r, irradiance);
-    alb_receivers_gather(&r->receivers);
-    add_bounces(r, irradiance, factors);
+    alb_receivers_gather(receivers);
+#pragma omp parallel for schedule(static)
+    for (size_t k = 0; k < receivers->count; k++)
+        for (uint32_t i = receivers->first[k]; i < receivers->first[k + 1]; i++)
+            for (int c = 0; c < 3; c++)
+                r->irradiance[receivers->members[i]][c] =
+                    irradiance[receivers->members[i]][c] + receivers->gathered[k][c];
     alb_scatter_apply(radiosity, r->equations->scatter, (const alb_rgb *)r->irradiance);
 }
 
@@ -130,6 +131,7 @@ void alb_relight_free(alb_relight *relight)
     free(relight->irradiance);
     free(relight->even);
     free(relight->sent);
+    free(relight->bounced);
     *relight = (alb_relight){0};
 }
 
@@ -139,5 +141,5 @@ size_t alb_relight_bytes(const alb_relight *r)
         return 0;
     const size_t clusters = r->equations->clusters.count;
     return 2 * clusters * alb_relight_numbers(r) * sizeof *r->u + alb_receivers_bytes(&r->receivers) +
-           2 * clusters * sizeof *r->even + r->count * sizeof *r->irradiance;
+           3 * clusters * sizeof *r->even + r->count * sizeof *r->irradiance;
 }

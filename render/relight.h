@@ -11,10 +11,10 @@ typedef struct alb_relight {
     // [receiver][column][channel] and [cluster][column][channel], whole numbers times the column's step; V has the
     // areas in it.
     int16_t *u, *v;
-    float *u_step, *v_step; // [column][channel]
-    double *partial;        // scratch
-    alb_rgb *even, *sent;   // scratch, of clusters
-    alb_rgb *irradiance;    // scratch
+    float *u_step, *v_step;         // [column][channel]
+    double *partial;                // scratch
+    alb_rgb *even, *sent, *bounced; // scratch, of clusters
+    alb_rgb *irradiance;            // scratch
     // |B - exact| / |exact|, area-weighted 2-norm, worst channel, exact with the same scattering: rms over the test
     // lights of the kind that errs most, and the worst light
     double error_percent, worst_percent;

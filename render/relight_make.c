@@ -9,7 +9,7 @@
 enum { COLUMNS_STEP = 8, CHOOSING = 16, TESTS = 16 };
 enum { FOR_RANGE, FOR_TESTS, FOR_RECEIVERS }; // streams of random numbers
 static const double choosing_residual = 1e-2, range_residual = 1e-3, adjoint_residual = 3e-4, test_residual = 1e-4;
-static const double missed_by_receivers = 0.003; // of the radiosity
+static const double missed_by_receivers = 0.005; // of the radiosity
 static const double minus_one[1][3] = {{-1, -1, -1}};
 
 typedef struct maker {
@@ -187,6 +187,7 @@ static bool allocate(maker *m, alb_error *error)
         !(m->solution = alb_allocate(n, sizeof *m->solution, error)) ||
         !(m->shares = alb_allocate(clusters, sizeof *m->shares, error)) ||
         !(out->even = alb_allocate(clusters, sizeof *out->even, error)) ||
+        !(out->bounced = alb_allocate(clusters, sizeof *out->bounced, error)) ||
         !(out->sent = alb_allocate(clusters, sizeof *out->sent, error)) ||
         !(out->irradiance = alb_allocate(n, sizeof *out->irradiance, error)))
         return false;

@@ -65,7 +65,7 @@ static int by_index(const void *a, const void *b)
 static void choose(group *groups, size_t count, const alb_radiosity *equations, alb_rgb *const *bounced,
                    const double (*lengths)[3], size_t light_count, double error_wanted)
 {
-    double left = 0, total_mm2 = 0;
+    double missed = 0, total_mm2 = 0;
     for (size_t k = 0; k < equations->clusters.count; k++)
         total_mm2 += equations->clusters.areas_mm2[k];
 #pragma omp parallel for schedule(static)
@@ -73,12 +73,10 @@ static void choose(group *groups, size_t count, const alb_radiosity *equations, 
         for (size_t k = 0; k < light_count; k++)
             groups[g].missed += missed_of(&groups[g], equations, (const alb_rgb *)bounced[k], lengths[k]) /
                                 ((double)light_count * total_mm2);
-    for (size_t g = 0; g < count; g++)
-        left += groups[g].missed;
     qsort(groups, count, sizeof *groups, by_missed);
-    for (size_t g = 0; g < count && left > error_wanted * error_wanted; g++) {
-        groups[g].apart = true;
-        left -= groups[g].missed;
+    for (size_t g = count; g-- > 0;) {
+        missed += groups[g].missed;
+        groups[g].apart = missed > error_wanted * error_wanted;
     }
     qsort(groups, count, sizeof *groups, by_index);
 }
@@ -120,8 +118,7 @@ static bool fill_rows(alb_receivers *out, const alb_form_factors *factors, alb_e
         long rays = 0;
         for (uint32_t i = out->first[r]; i < out->first[r + 1]; i++)
             rays += alb_form_factors_rays(factors, out->members[i]);
-        const long most = out->first[r + 1] - out->first[r] > 1 ? ALB_RECEIVER_RAYS : ALB_RECEIVER_RAYS / 2;
-        lengths[r] = (uint32_t)(rays < most ? rays : most);
+        lengths[r] = (uint32_t)(rays < ALB_RECEIVER_RAYS ? rays : ALB_RECEIVER_RAYS);
     }
     bool ok = lengths && alb_hit_rows_create(&out->rows, lengths, out->count, n + 2, (uint32_t)n, 0, error);
     const size_t largest = ok ? alb_hit_rows_largest_chunk(&out->rows) : 0;
