@@ -10,7 +10,6 @@
 typedef float float8 __attribute__((vector_size(32)));
 typedef uint32_t word8 __attribute__((vector_size(32)));
 
-enum { TASK_LEAVES = 8192 };
 static const double light_unit = 0x1p60;
 
 // Weights of a channel of the source in the low half of the codes' words, or in the high one.
@@ -47,40 +46,33 @@ static void add_sources(float sums[3][ALB_BLOCK], const alb_weight_block *block,
     memcpy(sums, all, sizeof all);
 }
 
-static void gather(const alb_weights *weights, const alb_forest *forest, const double (*irradiance)[3],
-                   uint32_t cluster, uint32_t first_leaf, uint32_t count)
+// Children stand behind their parents.
+static inline void gather_one(const alb_weights *weights, const double (*irradiance)[3], size_t cluster)
 {
+    const alb_weight_cluster *of = &weights->clusters[cluster];
     float *out = weights->lights[cluster];
-    if (count == 1) {
+    if (of->left_share < 0)
         for (int c = 0; c < 3; c++)
-            out[c] = (float)(light_unit * irradiance[forest->patches[first_leaf]][c]);
-        return;
-    }
-    const uint32_t left = alb_left_count(count);
-    if (count > TASK_LEAVES) {
-#pragma omp task
-        gather(weights, forest, irradiance, cluster + 1, first_leaf, left);
-        gather(weights, forest, irradiance, cluster + 2 * left, first_leaf + left, count - left);
-#pragma omp taskwait
-    } else {
-        gather(weights, forest, irradiance, cluster + 1, first_leaf, left);
-        gather(weights, forest, irradiance, cluster + 2 * left, first_leaf + left, count - left);
-    }
-    const float *of_left = weights->lights[cluster + 1], *of_right = weights->lights[cluster + 2 * left],
-                share = weights->left_shares[cluster - first_leaf];
-    for (int c = 0; c < 3; c++)
-        out[c] = of_right[c] + share * (of_left[c] - of_right[c]);
+            out[c] = (float)(light_unit * irradiance[of->right][c]);
+    else
+        for (int c = 0; c < 3; c++)
+            out[c] = weights->lights[of->right][c] + of->left_share * (out[4 + c] - weights->lights[of->right][c]);
+}
+
+static void gather(const alb_weights *weights, const double (*irradiance)[3])
+{
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t part = 0; part < weights->part_count; part++)
+        for (size_t cluster = weights->parts[part][1]; cluster-- > weights->parts[part][0];)
+            gather_one(weights, irradiance, cluster);
+    for (size_t top = weights->top_count; top-- > 0;)
+        gather_one(weights, irradiance, weights->tops[top]);
 }
 
 void alb_weights_add(double (*out)[3], const alb_weights *weights, const alb_forest *forest,
                      const double (*irradiance)[3])
 {
-#pragma omp parallel
-#pragma omp single
-    for (const alb_tree *tree = forest->trees; tree < forest->trees + forest->tree_count; tree++) {
-#pragma omp task if (tree->leaf_count > 256)
-        gather(weights, forest, irradiance, tree->first_cluster, tree->first_leaf, tree->leaf_count);
-    }
+    gather(weights, irradiance);
 #pragma omp parallel for schedule(dynamic, 32)
     for (size_t b = 0; b < weights->block_count; b++) {
         const alb_weight_block *block = &weights->blocks[b];
@@ -97,7 +89,9 @@ void alb_weights_free(alb_weights *weights)
     free(weights->blocks);
     free(weights->codes);
     free(weights->gaps);
-    free(weights->left_shares);
+    free(weights->clusters);
+    free(weights->parts);
+    free(weights->tops);
     free(weights->lights);
     *weights = (alb_weights){0};
 }
@@ -106,5 +100,6 @@ size_t alb_weights_bytes(const alb_weights *weights, const alb_forest *forest)
 {
     const alb_weight_block *block = weights->blocks;
     return weights->block_count * sizeof *block + weights->group_count * (sizeof *block->gaps + sizeof *block->codes) +
-           forest->leaf_count * (sizeof *weights->left_shares + 2 * sizeof *weights->lights);
+           weights->part_count * sizeof *weights->parts + weights->top_count * sizeof *weights->tops +
+           (weights->clusters ? forest->cluster_count * (sizeof *weights->clusters + sizeof *weights->lights) : 0);
 }

@@ -6,6 +6,7 @@
 // 2^-126 on. Below 4 none but zero is used, for those would be denormal. Of each row and source those of R, G and B
 // stand beside each other in 16 bits, and two sources share a word.
 enum { ALB_WEIGHT_GROUP = 4, ALB_WEIGHT_BITS = 5, ALB_WEIGHT_SHIFT = 21 };
+enum { ALB_WEIGHT_PART = 2048 };       // leaves of a subtree, at most
 enum { ALB_WEIGHT_GROUPS_AHEAD = 24 }; // what a product asks memory for before it is there
 
 // What lights a block of exit patches: clusters of the forest, source k the one first_source + gaps[0] + ... + gaps[k].
@@ -17,12 +18,22 @@ typedef struct alb_weight_block {
     uint16_t (*gaps)[ALB_WEIGHT_GROUP];
 } alb_weight_block;
 
+// How the light of a cluster comes about: the means of its children, the next cluster and the one here, by the left
+// one's part of the area; of a patch, below zero, that is the patch.
+typedef struct alb_weight_cluster {
+    uint32_t right;
+    float left_share;
+} alb_weight_cluster;
+
 typedef struct alb_weights {
     size_t block_count, group_count;
     alb_weight_block *blocks;
     uint32_t (*codes)[ALB_WEIGHT_GROUP / 2][ALB_BLOCK]; // of all blocks, and ALB_WEIGHT_GROUPS_AHEAD beyond
     uint16_t (*gaps)[ALB_WEIGHT_GROUP];
-    float *left_shares; // of nodes: the part of the area that the left child has
+    alb_weight_cluster *clusters; // of the forest
+    uint32_t (*parts)[2];         // first clusters and ends of subtrees that are summed on their own,
+    uint32_t *tops;               // and the clusters above them, in order
+    size_t part_count, top_count;
     float (*lights)[4]; // of clusters, patches too: mean irradiance of R, G and B; workspace of a product
 } alb_weights;
 

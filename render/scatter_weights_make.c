@@ -44,23 +44,43 @@ typedef struct maker {
     bool failed;
 } maker;
 
-static float find_extents(extent *clusters, uint32_t *of_leaves, uint32_t *of_nodes, float *left_shares,
-                          const alb_forest *forest, uint32_t cluster, uint32_t first_leaf, uint32_t count)
+// Extents of the clusters, which of them are leaves and nodes, and how their light comes about.
+typedef struct finder {
+    const alb_forest *forest;
+    alb_weights *weights;
+    extent *clusters;
+    uint32_t *of_leaves, *of_nodes;
+} finder;
+
+static float find_extents(const finder *f, uint32_t cluster, uint32_t first_leaf, uint32_t count)
 {
     const uint32_t left = count > 1 ? alb_left_count(count) : 0;
-    float area_mm2 = forest->areas_mm2[first_leaf];
+    float area_mm2 = f->forest->areas_mm2[first_leaf];
     if (count > 1) {
-        const float of_left =
-            find_extents(clusters, of_leaves, of_nodes, left_shares, forest, cluster + 1, first_leaf, left);
-        area_mm2 = of_left + find_extents(clusters, of_leaves, of_nodes, left_shares, forest, cluster + 2 * left,
-                                          first_leaf + left, count - left);
-        left_shares[cluster - first_leaf] = of_left / area_mm2;
-        of_nodes[cluster - first_leaf] = cluster;
+        const float of_left = find_extents(f, cluster + 1, first_leaf, left);
+        area_mm2 = of_left + find_extents(f, cluster + 2 * left, first_leaf + left, count - left);
+        f->of_nodes[cluster - first_leaf] = cluster;
+        f->weights->clusters[cluster] = (alb_weight_cluster){cluster + 2 * left, of_left / area_mm2};
     } else {
-        of_leaves[first_leaf] = cluster;
+        f->of_leaves[first_leaf] = cluster;
+        f->weights->clusters[cluster] = (alb_weight_cluster){f->forest->patches[first_leaf], -1};
     }
-    clusters[cluster] = (extent){first_leaf, count, area_mm2};
+    f->clusters[cluster] = (extent){first_leaf, count, area_mm2};
     return area_mm2;
+}
+
+static void cut_parts(const finder *f, uint32_t cluster)
+{
+    alb_weights *weights = f->weights;
+    const uint32_t count = f->clusters[cluster].count;
+    if (count <= ALB_WEIGHT_PART) {
+        weights->parts[weights->part_count][0] = cluster;
+        weights->parts[weights->part_count++][1] = cluster + 2 * count - 1;
+        return;
+    }
+    weights->tops[weights->top_count++] = cluster;
+    cut_parts(f, cluster + 1);
+    cut_parts(f, weights->clusters[cluster].right);
 }
 
 static source source_of(const maker *m, uint32_t cluster)
@@ -380,16 +400,21 @@ bool alb_weights_create(alb_weights *weights, const alb_links *links, const alb_
                         const alb_scatter_kernel *kernels, const double (*row_sums)[3], const double (*local)[3],
                         double error_wanted, alb_error *error)
 {
+    const size_t most_parts = forest->tree_count + forest->leaf_count / (ALB_WEIGHT_PART / 4); // of a quarter at least
     extent *clusters = alb_allocate(forest->cluster_count, sizeof *clusters, error);
     uint32_t *of_leaves = clusters ? alb_allocate(2 * forest->leaf_count, sizeof *of_leaves, error) : NULL,
              *of_nodes = of_leaves + (of_leaves ? forest->leaf_count : 0);
     *weights = (alb_weights){.block_count = links->block_count};
     bool ok = of_leaves && (weights->blocks = alb_allocate(links->block_count, sizeof *weights->blocks, error)) &&
-              (weights->left_shares = alb_allocate(forest->leaf_count, sizeof *weights->left_shares, error)) &&
+              (weights->clusters = alb_allocate(forest->cluster_count, sizeof *weights->clusters, error)) &&
+              (weights->parts = alb_allocate(most_parts, sizeof *weights->parts, error)) &&
+              (weights->tops = alb_allocate(most_parts, sizeof *weights->tops, error)) &&
               (weights->lights = alb_allocate(forest->cluster_count, sizeof *weights->lights, error));
-    for (const alb_tree *tree = forest->trees; ok && tree < forest->trees + forest->tree_count; tree++)
-        find_extents(clusters, of_leaves, of_nodes, weights->left_shares, forest, tree->first_cluster, tree->first_leaf,
-                     tree->leaf_count);
+    const finder f = {forest, weights, clusters, of_leaves, of_nodes};
+    for (const alb_tree *tree = forest->trees; ok && tree < forest->trees + forest->tree_count; tree++) {
+        find_extents(&f, tree->first_cluster, tree->first_leaf, tree->leaf_count);
+        cut_parts(&f, tree->first_cluster);
+    }
     maker m = {
         .forest = forest, .kernels = kernels, .clusters = clusters, .of_leaves = of_leaves, .of_nodes = of_nodes};
     if (ok && !write_blocks(weights, &m, links, row_sums, local, error_wanted))
