@@ -15,8 +15,8 @@ typedef struct alb_relight {
     double *partial;                // scratch
     alb_rgb *even, *sent, *bounced; // scratch, of clusters
     alb_rgb *irradiance;            // scratch
-    // |B - exact| / |exact|, area-weighted 2-norm, worst channel, exact with the same scattering: rms over the test
-    // lights of the kind that errs most, and the worst light
+    // |B - exact| / |exact|, area-weighted 2-norm, worst channel, exact by the links of the scattering: rms over the
+    // test lights of the kind that errs most, and the worst light
     double error_percent, worst_percent;
     int tests;
 } alb_relight;
@@ -32,8 +32,8 @@ static inline size_t alb_relight_blocks(const alb_relight *r)
 
 // Made of 2 rank + 32 solutions. rank: 0..ALB_RELIGHT_RANK_MAX and at most the number of patches, rounded up to whole
 // eights. The error is stated from lights of four kinds at random places, solved to 1e-4. Quicker to make and to use
-// where the scattering keeps weights (scatter.h), whose error comes on top. ALB_BAD_DATA for a rank out of range; else
-// it fails as solutions do. After the materials change, make it anew.
+// where the scattering keeps weights (scatter.h), whose error is in what is stated. ALB_BAD_DATA for a rank out of
+// range; else it fails as solutions do. After the materials change, make it anew.
 bool alb_relight_create(alb_relight *relight, alb_radiosity *equations, const alb_patches *patches, int rank,
                         uint64_t seed, alb_error *error);
 void alb_relight_free(alb_relight *relight);

@@ -159,7 +159,10 @@ static bool state_error(maker *m, alb_error *error)
         double whole[3], off[3], worst = 0;
         alb_rgb *found = m->basis[0]; // its columns are packed
         random_light(m, FOR_TESTS, test);
-        if (!solve(m, (const alb_rgb *)m->light, NULL, test_residual, error))
+        alb_scatter_use_links(out->equations->scatter, true);
+        const bool solved = solve(m, (const alb_rgb *)m->light, NULL, test_residual, error);
+        alb_scatter_use_links(out->equations->scatter, false);
+        if (!solved)
             return false;
         alb_relight_apply(found, out, (const alb_rgb *)m->light);
         alb_space_norm(whole, &m->space, (const alb_rgb *)m->solution);
