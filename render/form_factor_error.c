@@ -95,6 +95,8 @@ static double worst_percent(const rgb *squares, size_t count)
             sum_of_squares += squares[p][c] * squares[p][c];
         }
         const double mean = sum / n, variance = fmax(0, sum_of_squares / n - mean * mean);
+        if (isnan(sum)) // fmax would leave it out
+            return (double)NAN;
         worst = fmax(worst, mean + quantile * sqrt(2 * variance / n));
     }
     return 100 * sqrt(worst);

@@ -148,7 +148,7 @@ bool alb_radiosity_check(double *largest, const alb_scatter *scatter, bool close
     int channel = 0;
     for (size_t i = 0; i < n; i++)
         for (int c = 0; c < 3; c++)
-            if (!(sums[i][c] <= sums[patch][channel]))
+            if (!(sums[i][c] <= sums[patch][channel]) && !isnan(sums[patch][channel]))
                 patch = i, channel = c;
     if (n) {
         const double sum = sums[patch][channel], rounding = 1e-6; // weights are floats

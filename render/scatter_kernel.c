@@ -54,6 +54,9 @@ size_t alb_scatter_kernel_bytes(const alb_scatter_kernel *kernel)
            (kernel->discs ? (ALB_DISC_KNOTS + 1) * sizeof *kernel->discs : 0);
 }
 
+// Relative change over a step: steeper ones, of five decay lengths, are not resolved and may overflow.
+static const double steepest = 64;
+
 static double finite_value(const alb_profile *profile, double r_mm, double step_mm)
 {
     const double s = alb_profile_value(profile, r_mm);
@@ -74,9 +77,10 @@ static void write_octave(float (*values)[4], float (*bends)[8], const alb_profil
             const int at = q ? q : 1;
             const double bend = 0.5 * (s[at - 1] - 2 * s[at] + s[at + 1]) / (step * step);
             values[q][c] = (float)s[q];
-            if (!(s[q] > 0))
+            if (!(values[q][c] > 0)) // what underflows has no slope either
                 continue;
-            bends[q][c] = q ? (float)((s[q + 1] - s[q - 1]) / (2 * step * s[q])) : 0;
+            const double slope = q ? (s[q + 1] - s[q - 1]) / (2 * s[q]) : 0;
+            bends[q][c] = (float)(fmin(fmax(slope, -steepest), steepest) / step);
             bends[q][4 + c] = (float)fmin(fmax(bend / s[q], -0.5 / spread_mm2), 4 / spread_mm2);
         }
     }

@@ -204,7 +204,7 @@ static bool read_settings(alb_scene *scene, alb_node root, alb_error *error)
     if ((alb_node_has(root, "error_percent") &&
          !alb_node_number(&scene->error_percent, root, "error_percent", 0.01, 100, error)) ||
         (alb_node_has(root, "memory_mb") && !alb_node_integer(&memory_mb, root, "memory_mb", 1, 1L << 24, error)) ||
-        (scene->rays_given && !alb_node_integer(&rays, root, "rays_per_patch", 1, 65536, error)) ||
+        (scene->rays_given && !alb_node_integer(&rays, root, "rays_per_patch", 2, 65536, error)) ||
         (alb_node_has(root, "frames") && !alb_node_integer(&frames, root, "frames", 1, ALB_FRAMES_MAX, error)) ||
         (alb_node_has(root, "seed") && !alb_node_integer(&seed, root, "seed", 0, 0x7fffffff, error)) ||
         (alb_node_has(root, "residual") && !alb_node_number(&scene->residual, root, "residual", 1e-12, 0.1, error)))

@@ -2,12 +2,12 @@
 // that share an edge leave no gap. With 64 pixels a row the cover of a picture is a word a row, and
 //     S_i = sum over rows and their covered runs [a, b) of  P[row][b][i] - P[row][a][i],   P = sums of the lens
 // A pixel's integral is the mean of 4 x 4 points times the solid angle dA / (1 + x^2 + y^2)^(3/2).
-// Stops being true for what is thinner than a pixel: it is seen where it meets a centre, right on average alone. With
-// y down, a front face (counter-clockwise to the eye) has a negative area.
+// Stops being true for what is thinner than a pixel: it is seen where it meets a centre, right on average alone.
 #include "render/shadow_view.h"
 #include "base/memory.h"
 #include "base/vector_clones.h"
 #include "render/sh.h"
+#include "render/shadow_rows.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -68,59 +68,28 @@ void alb_shadow_project(alb_shadow_corners *out, const float *x, const float *y,
             depth[i] = m[2][0] * x[i] + m[2][1] * y[i] + m[2][2] * z[i] + away;
 }
 
-// The first pixel whose centre lies beyond the coordinate; coordinates are in 0..pixels up to rounding.
-static inline int first_beyond(float at) { return (int)(at + 0.5f); }
-
-typedef struct edge_point {
-    float x, y;
-} edge_point;
-
-static inline float least(float a, float b) { return a < b ? a : b; }
-static inline float most(float a, float b) { return a > b ? a : b; }
-
-// The run of covered pixels of each row of a triangle; count of rows from *first on.
-static inline int find_runs(int *first, int (*runs)[2], edge_point a, edge_point b, edge_point c)
-{
-    edge_point swap;
-    if (a.y > b.y)
-        swap = a, a = b, b = swap;
-    if (b.y > c.y)
-        swap = b, b = c, c = swap;
-    if (a.y > b.y)
-        swap = a, a = b, b = swap;
-    const int top = first_beyond(a.y), middle = first_beyond(b.y), bottom = first_beyond(c.y);
-    // each edge is followed from its upper end, by whichever face: the same bits for both that share it
-    const float along = top < bottom ? (c.x - a.x) / (c.y - a.y) : 0;
-    const float upper = top < middle ? (b.x - a.x) / (b.y - a.y) : 0;
-    const float lower = middle < bottom ? (c.x - b.x) / (c.y - b.y) : 0;
-    for (int row = top; row < bottom; row++) {
-        const float y = (float)row + 0.5f, one = a.x + (y - a.y) * along,
-                    other = row < middle ? a.x + (y - a.y) * upper : b.x + (y - b.y) * lower;
-        runs[row - top][0] = first_beyond(least(one, other));
-        runs[row - top][1] = first_beyond(most(one, other));
-    }
-    *first = top;
-    return bottom - top;
-}
-
 static inline uint64_t bits_below(int n) { return n >= 64 ? UINT64_MAX : ((uint64_t)1 << n) - 1; }
+
+static int faces_from(size_t first, size_t count)
+{
+    return count - first < ALB_SHADOW_FACES ? (int)(count - first) : ALB_SHADOW_FACES;
+}
 
 void alb_shadow_view_occlusion(float *out, const alb_shadow_corners *at, const uint32_t (*faces)[3], size_t face_count,
                                bool fronts_only, const alb_shadow_lens *lens)
 {
-    uint64_t cover[ALB_SHADOW_PIXELS_MAX + 1] = {0};
-    for (size_t f = 0; f < face_count; f++) {
-        const uint32_t *v = faces[f];
-        const edge_point a = {at->x[v[0]], at->y[v[0]]}, b = {at->x[v[1]], at->y[v[1]]}, c = {at->x[v[2]], at->y[v[2]]};
-        if (fronts_only && (b.x - a.x) * (c.y - a.y) >= (c.x - a.x) * (b.y - a.y))
-            continue;
-        if (first_beyond(least(a.x, least(b.x, c.x))) == first_beyond(most(a.x, most(b.x, c.x))) ||
-            first_beyond(least(a.y, least(b.y, c.y))) == first_beyond(most(a.y, most(b.y, c.y))))
-            continue; // most faces of a fine mesh lie between the centres
-        int first, runs[ALB_SHADOW_PIXELS_MAX + 1][2];
-        const int rows = find_runs(&first, runs, a, b, c);
-        for (int k = 0; k < rows; k++)
-            cover[first + k] |= bits_below(runs[k][1]) & ~bits_below(runs[k][0]);
+    uint64_t cover[ALB_SHADOW_PIXELS_MAX + 1] = {0}, below[ALB_SHADOW_PIXELS_MAX + 1];
+    alb_shadow_rows rows;
+    for (int n = 0; n <= ALB_SHADOW_PIXELS_MAX; n++)
+        below[n] = bits_below(n);
+    for (size_t first = 0; first < face_count; first += ALB_SHADOW_FACES) {
+        alb_shadow_rows_set(&rows, at, faces + first, faces_from(first, face_count), fronts_only);
+        for (int n = 0; n < rows.count; n++)
+            for (int row = rows.top[n]; row < rows.bottom[n]; row++) {
+                int run[2];
+                alb_shadow_rows_run(run, &rows, n, row);
+                cover[row] |= below[run[1]] ^ below[run[0]];
+            }
     }
     const size_t values = (size_t)lens->values;
     memset(out, 0, values * sizeof *out);
@@ -140,37 +109,38 @@ typedef struct plane {
     float at_origin, along_x, along_y;
 } plane;
 
-static plane inverse_depth(edge_point a, edge_point b, edge_point c, const float depth[3], float area)
+static plane inverse_depth(const float x[3], const float y[3], const float depth[3], float area)
 {
     const float da = 1 / depth[0], db = 1 / depth[1] - da, dc = 1 / depth[2] - da;
     plane p;
-    p.along_x = (db * (c.y - a.y) - dc * (b.y - a.y)) / area;
-    p.along_y = (dc * (b.x - a.x) - db * (c.x - a.x)) / area;
-    p.at_origin = da - p.along_x * a.x - p.along_y * a.y;
+    p.along_x = (db * (y[2] - y[0]) - dc * (y[1] - y[0])) / area;
+    p.along_y = (dc * (x[1] - x[0]) - db * (x[2] - x[0])) / area;
+    p.at_origin = da - p.along_x * x[0] - p.along_y * y[0];
     return p;
 }
 
+// Face n of those counted, with corners v.
 ALB_VECTOR_CLONES
-static void draw(float *nearest, uint32_t *seen, const alb_shadow_corners *at, const uint32_t *v, uint32_t mark,
-                 int pixels)
+static void draw(float *nearest, uint32_t *seen, const alb_shadow_rows *rows, int n, const alb_shadow_corners *at,
+                 const uint32_t *v, uint32_t mark, int pixels)
 {
-    const edge_point a = {at->x[v[0]], at->y[v[0]]}, b = {at->x[v[1]], at->y[v[1]]}, c = {at->x[v[2]], at->y[v[2]]};
-    const float area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
+    const float x[3] = {at->x[v[0]], at->x[v[1]], at->x[v[2]]}, y[3] = {at->y[v[0]], at->y[v[1]], at->y[v[2]]};
     const float depth[3] = {at->depth[v[0]], at->depth[v[1]], at->depth[v[2]]};
-    int first, runs[ALB_SHADOW_PIXELS_MAX + 1][2];
+    const float area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
     if (area == 0)
         return;
     mark = area > 0 ? 0 : mark; // its back
-    const plane p = inverse_depth(a, b, c, depth, area);
-    const int rows = find_runs(&first, runs, a, b, c);
-    for (int k = 0; k < rows; k++) {
-        const float start = p.at_origin + p.along_y * ((float)(first + k) + 0.5f) + 0.5f * p.along_x;
-        float *restrict near = nearest + (size_t)((first + k) * pixels);
-        uint32_t *restrict what = seen + (size_t)((first + k) * pixels);
-        for (int x = runs[k][0]; x < runs[k][1]; x++) { // without a branch: eight pixels at a time
-            const float inverse = start + p.along_x * (float)x, before = near[x];
-            near[x] = inverse > before ? inverse : before;
-            what[x] = inverse > before ? mark : what[x];
+    const plane p = inverse_depth(x, y, depth, area);
+    for (int row = rows->top[n]; row < rows->bottom[n]; row++) {
+        const float start = p.at_origin + p.along_y * ((float)row + 0.5f) + 0.5f * p.along_x;
+        float *restrict near = nearest + (size_t)(row * pixels);
+        uint32_t *restrict what = seen + (size_t)(row * pixels);
+        int run[2];
+        alb_shadow_rows_run(run, rows, n, row);
+        for (int column = run[0]; column < run[1]; column++) { // without a branch: eight pixels at a time
+            const float inverse = start + p.along_x * (float)column, before = near[column];
+            near[column] = inverse > before ? inverse : before;
+            what[column] = inverse > before ? mark : what[column];
         }
     }
 }
@@ -184,8 +154,14 @@ void alb_shadow_view_radiance(float *out, const alb_shadow_corners *corners, con
     memset(nearest, 0, all * sizeof *nearest);
     memset(seen, 0, all * sizeof *seen);
     memset(out, 0, 3 * values * sizeof *out);
-    for (size_t f = 0; f < face_count; f++)
-        draw(nearest, seen, corners, faces[f], face_colours[f], pixels);
+    alb_shadow_rows rows;
+    for (size_t first = 0; first < face_count; first += ALB_SHADOW_FACES) {
+        alb_shadow_rows_set(&rows, corners, faces + first, faces_from(first, face_count), false);
+        for (int n = 0; n < rows.count; n++) {
+            const size_t face = first + (size_t)rows.faces[n];
+            draw(nearest, seen, &rows, n, corners, faces[face], face_colours[face], pixels);
+        }
+    }
     for (int row = 0; row < pixels; row++)
         for (int column = 0; column < pixels;) {
             const uint32_t mark = seen[row * pixels + column];

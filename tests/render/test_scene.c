@@ -51,7 +51,7 @@ static void refuses_what_is_wrong(void **state)
         {"{\"format\":1,\"objects\":[]," WHITE "," CAMERA "}", "0 objects"},
         {"{\"format\":1," BOX "," WHITE "}", "camera"},
         {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"rays\":3}", "rays"},
-        {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"rays_per_patch\":0}", "rays_per_patch"},
+        {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"rays_per_patch\":1}", "rays_per_patch"},
         {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"error_percent\":0}", "error_percent"},
         {"{\"format\":1," BOX "," WHITE "," CAMERA ",\"memory_mb\":0}", "memory_mb"},
         {"{\"format\":1," BOX ",\"materials\":{\"m\":{\"reflectance\":[0.5,0.5,1.5]}}," CAMERA "}", "reflectance"},
