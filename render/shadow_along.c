@@ -53,7 +53,8 @@ static void add_inner(looks *l, size_t receiver, const alb_shadow_field *field, 
 {
     const alb_vector out = x > 0 ? alb_times(1 / x, off) : (alb_vector){0, 0, 1}, axis = alb_times(-1, out);
     int above = 0;
-    while (field->shells[above].radius <= x)
+    // bounded, for the root of a square below that of the last radius may be that radius
+    while (above < field->settings.inner && field->shells[above].radius <= x)
         above++;
     const double high = field->shells[above].radius, low = above > 0 ? field->shells[above - 1].radius : 0;
     double t = low > 0 ? log(x / low) / log(high / low) : 1;

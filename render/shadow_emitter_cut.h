@@ -10,9 +10,12 @@ typedef struct alb_shadow_piece {
 
 static inline alb_vector alb_shadow_piece_at(const alb_shadow_piece *p, const alb_vector *vertices)
 {
-    alb_vector at = {0};
-    for (int k = 0; k < 3; k++)
-        at = alb_add(at, alb_times((double)p->weights[k], vertices[p->corners[k]]));
+    // from one corner on: the weights of all three add up to 1 but for rounding, which far from the origin is a
+    // distance
+    const alb_vector first = vertices[p->corners[0]];
+    alb_vector at = first;
+    for (int k = 1; k < 3; k++)
+        at = alb_add(at, alb_times((double)p->weights[k], alb_sub(vertices[p->corners[k]], first)));
     return at;
 }
 
