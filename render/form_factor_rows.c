@@ -22,12 +22,6 @@ enum { PIECE = 256 };
 
 typedef float float4 __attribute__((vector_size(16), may_alias));
 
-static size_t chunk_begin(const alb_hit_rows *rows, size_t chunk)
-{
-    const size_t row = chunk * ALB_CHUNK_ROWS;
-    return rows->first[row < rows->count ? row : rows->count];
-}
-
 static size_t rows_of(const alb_hit_rows *rows, size_t chunk)
 {
     const size_t left = rows->count - chunk * ALB_CHUNK_ROWS;
@@ -74,13 +68,18 @@ bool alb_hit_rows_create(alb_hit_rows *rows, const uint32_t *lengths, size_t cou
                            .blocks = (index_count + ALB_BLOCK_MAX - 1) / ALB_BLOCK_MAX};
     rows->block_size = (index_count + rows->blocks - 1) / rows->blocks;
     const size_t parts = rows->chunks * rows->blocks;
-    bool ok = (rows->first = alb_allocate(count + 1, sizeof *rows->first, error)) &&
+    bool ok = (rows->starts = alb_allocate(rows->chunks, (ALB_CHUNK_ROWS + 1) * sizeof *rows->starts, error)) &&
+              (rows->first = alb_allocate(rows->chunks + 1, sizeof *rows->first, error)) &&
               (rows->segments = alb_allocate(parts + 1, sizeof *rows->segments, error)) &&
               (rows->counts = alb_allocate(parts, 2 * ALB_CHUNK_ROWS * sizeof *rows->counts, error));
-    for (size_t p = 0; ok && p < count; p++)
-        rows->first[p + 1] = rows->first[p] + lengths[p];
+    for (size_t chunk = 0; ok && chunk < rows->chunks; chunk++) {
+        uint32_t *starts = rows->starts + chunk * (ALB_CHUNK_ROWS + 1);
+        for (size_t r = 0; r < ALB_CHUNK_ROWS; r++)
+            starts[r + 1] = starts[r] + (r < rows_of(rows, chunk) ? lengths[chunk * ALB_CHUNK_ROWS + r] : 0);
+        rows->first[chunk + 1] = rows->first[chunk] + starts[ALB_CHUNK_ROWS];
+    }
     if (ok) {
-        const size_t hits = rows->segments[parts] = rows->first[count];
+        const size_t hits = rows->segments[parts] = alb_hit_rows_rays(rows);
         ok = memory_bytes && hits > memory_bytes / sizeof *rows->hits
                  ? map_file(rows, hits * sizeof *rows->hits, error)
                  : (rows->hits = alb_allocate(hits, sizeof *rows->hits, error)) != NULL;
@@ -96,6 +95,7 @@ void alb_hit_rows_free(alb_hit_rows *rows)
         munmap(rows->hits, rows->mapped_bytes);
     else
         free(rows->hits);
+    free(rows->starts);
     free(rows->first);
     free(rows->segments);
     free(rows->counts);
@@ -105,15 +105,16 @@ void alb_hit_rows_free(alb_hit_rows *rows)
 size_t alb_hit_rows_bytes(const alb_hit_rows *rows)
 {
     const size_t parts = rows->chunks * rows->blocks;
-    return (rows->count + 1) * sizeof *rows->first + (parts + 1) * sizeof *rows->segments +
-           parts * 2 * ALB_CHUNK_ROWS * sizeof *rows->counts + rows->segments[parts] * sizeof *rows->hits;
+    return rows->chunks * (ALB_CHUNK_ROWS + 1) * sizeof *rows->starts + (rows->chunks + 1) * sizeof *rows->first +
+           (parts + 1) * sizeof *rows->segments + parts * 2 * ALB_CHUNK_ROWS * sizeof *rows->counts +
+           rows->segments[parts] * sizeof *rows->hits;
 }
 
 size_t alb_hit_rows_largest_chunk(const alb_hit_rows *rows)
 {
     size_t largest = 0;
     for (size_t chunk = 0; chunk < rows->chunks; chunk++) {
-        const size_t hits = chunk_begin(rows, chunk + 1) - chunk_begin(rows, chunk);
+        const size_t hits = rows->first[chunk + 1] - rows->first[chunk];
         largest = hits > largest ? hits : largest;
     }
     return largest;
@@ -154,11 +155,11 @@ static void sort_row(uint32_t *row, size_t length, uint32_t *scratch)
 
 void alb_hit_rows_fill(alb_hit_rows *rows, size_t chunk, uint32_t *hits, uint32_t *scratch)
 {
-    const size_t begin = chunk_begin(rows, chunk), base = chunk * ALB_CHUNK_ROWS, n = rows_of(rows, chunk);
+    const size_t begin = rows->first[chunk], base = chunk * ALB_CHUNK_ROWS, n = rows_of(rows, chunk);
     const uint32_t *places[ALB_CHUNK_ROWS][2], *ends[ALB_CHUNK_ROWS][2];
     for (size_t r = 0; r < n; r++) {
-        uint32_t *row = hits + (rows->first[base + r] - begin);
-        const size_t length = rows->first[base + r + 1] - rows->first[base + r];
+        uint32_t *row = hits + rows->starts[chunk * (ALB_CHUNK_ROWS + 1) + r];
+        const size_t length = alb_hit_rows_length(rows, base + r);
         sort_row(row, length, scratch);
         places[r][0] = row;
         places[r][1] = ends[r][0] = row + half_of(length, 0);
@@ -214,7 +215,7 @@ void alb_hit_rows_trim(alb_hit_rows *rows)
 // Hits of the row's half that are counted alone.
 static size_t missing(const alb_hit_rows *rows, size_t row, int half)
 {
-    size_t left = half_of(rows->first[row + 1] - rows->first[row], half);
+    size_t left = half_of(alb_hit_rows_length(rows, row), half);
     for (size_t block = 0; block < rows->blocks; block++)
         left -= counts_of(rows, row / ALB_CHUNK_ROWS, block)[row % ALB_CHUNK_ROWS][half];
     return left;
@@ -223,7 +224,7 @@ static size_t missing(const alb_hit_rows *rows, size_t row, int half)
 void alb_hit_rows_read(uint32_t *hits, const alb_hit_rows *rows, size_t row)
 {
     const size_t chunk = row / ALB_CHUNK_ROWS, within = row % ALB_CHUNK_ROWS;
-    uint32_t *out[2] = {hits, hits + half_of(rows->first[row + 1] - rows->first[row], 0)};
+    uint32_t *out[2] = {hits, hits + half_of(alb_hit_rows_length(rows, row), 0)};
     size_t left[2] = {missing(rows, row, 0), missing(rows, row, 1)};
     for (size_t block = 0; block < rows->blocks; block++) {
         const uint16_t(*counts)[2] = (const uint16_t(*)[2])counts_of(rows, chunk, block);
@@ -292,15 +293,15 @@ static void gather_difference(const product *p, size_t chunk, size_t block)
     const alb_hit_rows *rows = p->rows;
     const uint16_t(*counts)[2] = (const uint16_t(*)[2])counts_of(rows, chunk, block);
     const uint16_t *hits = rows->hits + rows->segments[chunk * rows->blocks + block];
-    const size_t n = rows_of(rows, chunk), *first = rows->first + chunk * ALB_CHUNK_ROWS;
+    const size_t n = rows_of(rows, chunk), first = chunk * ALB_CHUNK_ROWS;
     for (size_t r = 0; r < n; r++)
         for (int half = 0; half < 2; half++) {
             double sum[3] = {0};
-            const double weight = (half ? -1.0 : 1.0) / (double)half_of(first[r + 1] - first[r], half);
+            const double weight = (half ? -1.0 : 1.0) / (double)half_of(alb_hit_rows_length(rows, first + r), half);
             add_hits(sum, hits, counts[r][half], p->values + block * rows->block_size);
             hits += counts[r][half];
             for (int c = 0; c < 3; c++)
-                p->out[chunk * ALB_CHUNK_ROWS + r][c] += 0.5 * weight * sum[c];
+                p->out[first + r][c] += 0.5 * weight * sum[c];
         }
 }
 
@@ -323,7 +324,7 @@ static void start_rows(const product *p, size_t chunk)
     const float4 value = p->values[rows->counted];
     for (size_t r = begin; r < end && (value[0] != 0 || value[1] != 0 || value[2] != 0); r++)
         for (int half = 0; half < 2; half++) {
-            const double length = (double)half_of(rows->first[r + 1] - rows->first[r], half),
+            const double length = (double)half_of(alb_hit_rows_length(rows, r), half),
                          weight = !p->difference ? 1 : (half ? -0.5 : 0.5) / fmax(length, 1);
             for (int c = 0; c < 3; c++)
                 p->out[r][c] += weight * (double)missing(rows, r, half) * (double)value[c];
@@ -334,15 +335,15 @@ static void finish_rows(const product *p, size_t chunk)
 {
     for (size_t r = chunk * ALB_CHUNK_ROWS, end = r + rows_of(p->rows, chunk); !p->difference && r < end; r++)
         for (int c = 0; c < 3; c++)
-            p->out[r][c] /= (double)(p->rows->first[r + 1] - p->rows->first[r]);
+            p->out[r][c] /= (double)alb_hit_rows_length(p->rows, r);
 }
 
 static void ask_ahead(const alb_hit_rows *rows, size_t chunk)
 {
     if (chunk >= rows->chunks)
         return;
-    const uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE), begin = (uintptr_t)(rows->hits + chunk_begin(rows, chunk));
-    const uintptr_t end = (uintptr_t)(rows->hits + chunk_begin(rows, chunk + 1)), from = begin / page * page;
+    const uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE), begin = (uintptr_t)(rows->hits + rows->first[chunk]);
+    const uintptr_t end = (uintptr_t)(rows->hits + rows->first[chunk + 1]), from = begin / page * page;
     madvise((void *)from, end - from, MADV_WILLNEED);
 }
 

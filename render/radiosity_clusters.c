@@ -279,9 +279,8 @@ static void take_values(const alb_clusters *clusters, const alb_rgb *from)
 
 typedef float float4 __attribute__((vector_size(16), may_alias));
 
-// out = F_c radiosity
 ALB_VECTOR_CLONES
-static void gather(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity)
+void alb_clusters_gather(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity)
 {
     const float4 *values = (const float4 *)clusters->values;
     take_values(clusters, radiosity);
@@ -334,7 +333,7 @@ static void bounce(alb_rgb *out, const void *data, const alb_rgb *x)
 {
     const alb_clusters *clusters = data;
     alb_clusters_scatter(clusters->bounced, clusters, x);
-    gather(out, clusters, (const alb_rgb *)clusters->bounced);
+    alb_clusters_gather(out, clusters, (const alb_rgb *)clusters->bounced);
 }
 
 void alb_clusters_settle(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity)
@@ -342,7 +341,7 @@ void alb_clusters_settle(alb_rgb *out, const alb_clusters *clusters, const alb_r
     alb_radiosity_report report;
     const alb_bounce coarse = {
         .count = clusters->count, .areas_mm2 = clusters->areas_mm2, .data = clusters, .apply = bounce};
-    gather(clusters->right, clusters, radiosity);
+    alb_clusters_gather(clusters->right, clusters, radiosity);
     if (!alb_solver_run(out, &report, ALB_SOLVER_GMRES, &coarse, (const alb_rgb *)clusters->right, NULL,
                         coarse_residual, NULL))
         memset(out, 0, clusters->count * sizeof *out); // no memory: as without this level

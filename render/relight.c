@@ -1,23 +1,21 @@
 // With B = S'E + S'F B, the irradiance that patches send each other is G = F B = T E, T = (I - F S')^-1 F S', and
-//     B = S'(E + T E),    T ~= Q (T* Q)*        randomised range finder (Halko, Martinsson & Tropp 2011, alg. 4.1)
-// Q: an orthonormal basis, in the inner product weighted by area, of T applied to random lights, one solution each.
-// Lights and not white noise: that would find the sampling noise of F, which is most of T's rank and of which smooth
-// light sees little.
-// T*, the adjoint in that product, is S'F (I - S'F)^-1 by reciprocity, T* q = x - q with x = q + S'F x: another
-// solution. S'E stays exact, so that only light that has left one patch for another is narrowed down. (Sheng et al.
-// 2014 precompute the whole inverse for this, n^2 numbers.) With an exact bounce,
-//     B = S'(E + F S'E + T2 E),    T2 = F S' T
-// and T2 is narrower still: the light of a small spot has spread before the columns see it. It costs F and S' once
-// more.
+//     B = S'(E + G),    G = F S'(E + G)
+// (Sheng et al. 2014 precompute the whole inverse for this, n^2 numbers.) S'(E + G) at last is exact: shadows have
+// edges. What patches send each other is known as well as need be from less:
+//     G  ~=  P F_r S~ (E + P g),    g = F_c S_c Q E + U V^T Q E
+// F_r: rays of the receivers, groups of patches on which G is even (relight_receivers.h), P: the same on each patch of
+// a group. Q: means over the clusters of the equations' coarse level, F_c, S_c: bounces between these, S~: that which
+// scatters between clusters and keeps what varies within one where it is (radiosity_two_level.c). Each F sees little of
+// what the step before it got wrong. What is left, light that has bounced twice and more,
+//     T2 = F S' T  ~=  U V^T    by a randomised range finder (Halko, Martinsson & Tropp 2011, alg. 4.1)
+// U: means over clusters of an orthonormal basis, in the inner product weighted by area, of T2 applied to random
+// lights, one solution each. Lights and not white noise: that would find the sampling noise of F, which is most of the
+// rank and of which smooth light sees little. V: means over clusters of T2* of its columns. T*, the adjoint in that
+// product, is S'F (I - S'F)^-1 by reciprocity, T* q = x - q with x = q + S'F x: another solution. Numbers are kept as
+// 16-bit whole numbers of a step a column, 1/32767 of the largest, rows side by side: a product reads U and V once.
 //
-// T* q is as smooth as scattered light is: V is kept as its means over the clusters of the equations, V^T E ~= V^T Q E.
-// The rows of U that belong to one cluster are alike: few modes of them are kept, and what share each patch has in
-// each. Numbers are kept as 16-bit whole numbers of a step a column, 1/32767 of the largest, rows side by side: a
-// product reads U and V once.
-//
-// Where it stops being true: light that a few large columns do not span, such as the bounce of a small spot in a
-// corner, falls outside Q; reciprocity holds for rays and for sampled scattering only statistically. Both are in the
-// stated error, which is measured.
+// Where it stops being true: light that a few large columns do not span falls outside Q; reciprocity holds for rays and
+// for sampled scattering only statistically. Both are in the stated error, which is measured.
 #include "render/relight.h"
 #include "base/vector_clones.h"
 #include <stdlib.h>
@@ -47,13 +45,12 @@ static void dot_row(double out[3], const int16_t *restrict values, const float *
     }
 }
 
-// factors = V^T Q E, with the steps of V and U.
-static void project(float *factors, const alb_relight *r, const alb_rgb *irradiance)
+// factors = V^T of the clusters' irradiance, with the steps of V and U.
+static void project(float *factors, const alb_relight *r)
 {
     const size_t count = alb_relight_numbers(r), clusters = r->equations->clusters.count;
-    alb_clusters_average(r->even, &r->equations->clusters, irradiance);
 #pragma omp parallel for schedule(static)
-    for (size_t block = 0; block < alb_relight_blocks(r); block++) {
+    for (size_t block = 0; block < (count ? alb_relight_blocks(r) : 0); block++) {
         float sums[3 * ALB_RELIGHT_RANK_MAX] = {0}, light[LANES];
         for (size_t k = block * ALB_RELIGHT_ROWS; k < clusters && k < (block + 1) * ALB_RELIGHT_ROWS; k++) {
             const double *e = r->even[k];
@@ -73,65 +70,76 @@ static void project(float *factors, const alb_relight *r, const alb_rgb *irradia
     }
 }
 
-// The irradiance of a cluster's patches, and what the columns add to it.
-static void add_cluster(const alb_relight *r, size_t cluster, const float *factors, const alb_rgb *irradiance)
+// g, of the clusters, from Q E in r->even.
+static void bounce_coarsely(const alb_relight *r)
 {
     const alb_clusters *clusters = &r->equations->clusters;
-    const uint32_t first = r->first_mode[cluster], count = r->first_mode[cluster + 1] - first;
-    const float(*share)[3] = (const float(*)[3])r->shares + r->first_share[cluster];
-    double modes[ALB_RELIGHT_MODES_MAX][3];
-    for (uint32_t k = 0; k < count; k++)
-        dot_row(modes[k], r->u + (first + k) * alb_relight_numbers(r), factors, alb_relight_numbers(r));
-    for (uint32_t i = clusters->first[cluster]; i < clusters->first[cluster + 1]; i++, share += count) {
-        const uint32_t p = clusters->members[i];
-        for (int c = 0; c < 3; c++) {
-            double bounced = 0;
-            for (uint32_t k = 0; k < count; k++)
-                bounced += (double)share[k][c] * modes[k][c];
-            r->irradiance[p][c] = irradiance[p][c] + bounced;
-        }
+    const size_t count = alb_relight_numbers(r);
+    float factors[3 * ALB_RELIGHT_RANK_MAX];
+    project(factors, r);
+    alb_clusters_scatter(r->sent, clusters, (const alb_rgb *)r->even);
+    alb_clusters_gather(r->bounced, clusters, (const alb_rgb *)r->sent);
+#pragma omp parallel for schedule(static)
+    for (size_t k = 0; k < clusters->count; k++) {
+        double later[3];
+        dot_row(later, r->u + k * count, factors, count);
+        for (int c = 0; c < 3; c++)
+            r->bounced[k][c] += r->even[k][c] + later[c];
+    }
+}
+
+// S~ (E + P g), as what receivers gather, from Q E + g in r->bounced.
+static void send_roughly(const alb_relight *r, const alb_rgb *irradiance)
+{
+    const alb_clusters *clusters = &r->equations->clusters;
+    alb_clusters_scatter(r->sent, clusters, (const alb_rgb *)r->bounced);
+    for (size_t k = 0; k < clusters->count; k++) // as even light that sends it, less what is there
+        for (int c = 0; c < 3; c++)
+            r->sent[k][c] = (clusters->kept[k][c] > 0 ? r->sent[k][c] / clusters->kept[k][c] : 0) - r->even[k][c];
+#pragma omp parallel for schedule(static)
+    for (size_t p = 0; p < r->count; p++) {
+        const double *moved = r->sent[clusters->cluster[p]];
+        for (int c = 0; c < 3; c++)
+            r->receivers.values[p][c] = (float)(clusters->sums[p][c] * (moved[c] + irradiance[p][c]));
     }
 }
 
 void alb_relight_apply(alb_rgb *radiosity, alb_relight *r, const alb_rgb *irradiance)
 {
-    float factors[3 * ALB_RELIGHT_RANK_MAX];
-    project(factors, r, irradiance);
-#pragma omp parallel for schedule(dynamic, 16)
-    for (size_t k = 0; k < r->equations->clusters.count; k++)
-        add_cluster(r, k, factors, irradiance);
-    if (r->exact_bounce) {
-        alb_scatter_apply(radiosity, r->equations->scatter, irradiance);
-        alb_form_factors_apply(r->bounced, r->equations->factors, (const alb_rgb *)radiosity);
+    const alb_receivers *receivers = &r->receivers;
+    alb_clusters_average(r->even, &r->equations->clusters, irradiance);
+    bounce_coarsely(r);
+    send_roughly(r, irradiance);
+    alb_receivers_gather(receivers);
 #pragma omp parallel for schedule(static)
-        for (size_t p = 0; p < r->count; p++)
+    for (size_t k = 0; k < receivers->count; k++)
+        for (uint32_t i = receivers->first[k]; i < receivers->first[k + 1]; i++)
             for (int c = 0; c < 3; c++)
-                r->irradiance[p][c] += r->bounced[p][c];
-    }
+                r->irradiance[receivers->members[i]][c] =
+                    irradiance[receivers->members[i]][c] + receivers->gathered[k][c];
     alb_scatter_apply(radiosity, r->equations->scatter, (const alb_rgb *)r->irradiance);
 }
 
 void alb_relight_free(alb_relight *relight)
 {
+    alb_receivers_free(&relight->receivers);
     free(relight->u);
     free(relight->v);
-    free(relight->first_mode);
-    free(relight->first_share);
-    free(relight->shares);
     free(relight->u_step);
     free(relight->v_step);
     free(relight->partial);
     free(relight->irradiance);
-    free(relight->bounced);
     free(relight->even);
+    free(relight->sent);
+    free(relight->bounced);
     *relight = (alb_relight){0};
 }
 
 size_t alb_relight_bytes(const alb_relight *r)
 {
-    if (!r->rank)
+    if (!r->equations)
         return 0;
     const size_t clusters = r->equations->clusters.count;
-    return (r->first_mode[clusters] + clusters) * alb_relight_numbers(r) * sizeof *r->u +
-           r->first_share[clusters] * sizeof *r->shares + 2 * (clusters + 1) * sizeof *r->first_mode;
+    return 2 * clusters * alb_relight_numbers(r) * sizeof *r->u + alb_receivers_bytes(&r->receivers) +
+           3 * clusters * sizeof *r->even + r->count * sizeof *r->irradiance;
 }

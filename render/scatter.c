@@ -46,6 +46,7 @@ struct alb_scatter_parts {
     double (*totals)[3]; // of each kernel's profiles, as they are
     bool rows_known;     // the row sums are no estimate
     alb_weights weights; // empty: products look the profiles up
+    bool by_links;       // so they do although there are weights
 };
 
 static double radius_of(const alb_patches *patches, uint32_t patch)
@@ -407,7 +408,7 @@ void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const doubl
             if (even)
                 even[j][c] = scatter->local[j][c];
         }
-    if (p->weights.blocks) {
+    if (p->weights.blocks && !p->by_links) {
         alb_weights_add(out, &p->weights, &p->forest, irradiance);
         return;
     }
@@ -415,6 +416,8 @@ void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const doubl
     alb_product_add(out, even, &p->links, &p->forest, p->kernels, both_sides);
     p->rows_known = true;
 }
+
+void alb_scatter_use_links(const alb_scatter *scatter, bool links) { scatter->parts->by_links = links; }
 
 bool alb_scatter_keep_weights(alb_scatter *scatter, double error_wanted, double *error_percent, alb_error *error)
 {

@@ -63,6 +63,8 @@ void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const doubl
 // for): the largest found, |B - B'| / |B'| in the 2-norm weighted by area, over lights with sharp edges at random
 // places.
 bool alb_scatter_keep_weights(alb_scatter *scatter, double error_wanted, double *error_percent, alb_error *error);
+// Products by links although weights are kept, up to use_links(..., false): for what asks how much weights miss.
+void alb_scatter_use_links(const alb_scatter *scatter, bool links);
 // The part of S' irradiance that crossed a slab or a sheet: zero elsewhere. Same rows.
 void alb_scatter_apply_across(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
 // sources[first[p] .. first[p + 1]): patches whose light leaves from patch p, as often as their share of what even

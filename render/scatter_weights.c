@@ -10,68 +10,69 @@
 typedef float float8 __attribute__((vector_size(32)));
 typedef uint32_t word8 __attribute__((vector_size(32)));
 
-enum { TASK_LEAVES = 8192 };
 static const double light_unit = 0x1p60;
 
-// Sums of the block's rows, four sources at a time.
+// Weights of a channel of the source in the low half of the codes' words, or in the high one.
+static inline __attribute__((always_inline)) void take(float8 *out, const word8 *codes, int half, int channel)
+{
+    const int shift = ALB_WEIGHT_SHIFT - 16 * half - ALB_WEIGHT_BITS * channel;
+    const word8 moved = shift >= 0 ? *codes << shift : *codes >> -shift;
+    *out = (float8)(moved & 31U << ALB_WEIGHT_SHIFT);
+}
+
+// Sums of the block's rows.
 ALB_VECTOR_CLONES
 static void add_sources(float sums[3][ALB_BLOCK], const alb_weight_block *block, const float (*lights)[4])
 {
-    const uint32_t mask = (uint32_t)UINT8_MAX << ALB_WEIGHT_SHIFT;
     float8 all[3] = {{0}};
+    const uint16_t *gaps = *block->gaps;
+    lights += block->first_source;
     for (uint32_t group = 0; group < block->group_count; group++) {
-        const float *light[ALB_WEIGHT_GROUP];
-        for (int k = 0; k < ALB_WEIGHT_GROUP; k++)
-            light[k] = lights[block->sources[group * ALB_WEIGHT_GROUP + (uint32_t)k]];
-#pragma GCC unroll 3
-        for (int c = 0; c < 3; c++) {
+        __builtin_prefetch(block->codes[group + ALB_WEIGHT_GROUPS_AHEAD]);
+#pragma GCC unroll 2
+        for (int pair = 0; pair < ALB_WEIGHT_GROUP / 2; pair++) {
             word8 codes;
-            memcpy(&codes, block->codes[group][c], sizeof codes);
-            const float8 first = (float8)(codes << ALB_WEIGHT_SHIFT & mask),
-                         second = (float8)(codes << (ALB_WEIGHT_SHIFT - 8) & mask),
-                         third = (float8)(codes << (ALB_WEIGHT_SHIFT - 16) & mask),
-                         fourth = (float8)(codes >> (24 - ALB_WEIGHT_SHIFT) & mask);
-            all[c] += (first * light[0][c] + second * light[1][c]) + (third * light[2][c] + fourth * light[3][c]);
+            memcpy(&codes, block->codes[group][pair], sizeof codes);
+            const float *first = *(lights += *gaps++), *second = *(lights += *gaps++);
+#pragma GCC unroll 3
+            for (int c = 0; c < 3; c++) {
+                float8 weights[2];
+                take(&weights[0], &codes, 0, c);
+                take(&weights[1], &codes, 1, c);
+                all[c] += weights[0] * first[c] + weights[1] * second[c];
+            }
         }
     }
     memcpy(sums, all, sizeof all);
 }
 
-static void gather(const alb_weights *weights, const alb_forest *forest, const double (*irradiance)[3], uint32_t node,
-                   uint32_t first_leaf, uint32_t count)
+// Children stand behind their parents.
+static inline void gather_one(const alb_weights *weights, const double (*irradiance)[3], size_t cluster)
 {
-    if (count == 1) {
+    const alb_weight_cluster *of = &weights->clusters[cluster];
+    float *out = weights->lights[cluster];
+    if (of->left_share < 0)
         for (int c = 0; c < 3; c++)
-            weights->lights[first_leaf][c] = (float)(light_unit * irradiance[forest->patches[first_leaf]][c]);
-        return;
-    }
-    const uint32_t left = alb_left_count(count);
-    if (count > TASK_LEAVES) {
-#pragma omp task
-        gather(weights, forest, irradiance, node + 1, first_leaf, left);
-        gather(weights, forest, irradiance, node + left, first_leaf + left, count - left);
-#pragma omp taskwait
-    } else {
-        gather(weights, forest, irradiance, node + 1, first_leaf, left);
-        gather(weights, forest, irradiance, node + left, first_leaf + left, count - left);
-    }
-    const float(*nodes)[4] = (const float(*)[4])weights->lights + forest->leaf_count;
-    const float *of_left = left > 1 ? nodes[node + 1] : weights->lights[first_leaf],
-                *of_right = count - left > 1 ? nodes[node + left] : weights->lights[first_leaf + left];
-    for (int c = 0; c < 3; c++)
-        weights->lights[forest->leaf_count + node][c] =
-            of_right[c] + weights->left_shares[node] * (of_left[c] - of_right[c]);
+            out[c] = (float)(light_unit * irradiance[of->right][c]);
+    else
+        for (int c = 0; c < 3; c++)
+            out[c] = weights->lights[of->right][c] + of->left_share * (out[4 + c] - weights->lights[of->right][c]);
+}
+
+static void gather(const alb_weights *weights, const double (*irradiance)[3])
+{
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t part = 0; part < weights->part_count; part++)
+        for (size_t cluster = weights->parts[part][1]; cluster-- > weights->parts[part][0];)
+            gather_one(weights, irradiance, cluster);
+    for (size_t top = weights->top_count; top-- > 0;)
+        gather_one(weights, irradiance, weights->tops[top]);
 }
 
 void alb_weights_add(double (*out)[3], const alb_weights *weights, const alb_forest *forest,
                      const double (*irradiance)[3])
 {
-#pragma omp parallel
-#pragma omp single
-    for (const alb_tree *tree = forest->trees; tree < forest->trees + forest->tree_count; tree++) {
-#pragma omp task if (tree->leaf_count > 256)
-        gather(weights, forest, irradiance, tree->first_cluster - tree->first_leaf, tree->first_leaf, tree->leaf_count);
-    }
+    gather(weights, irradiance);
 #pragma omp parallel for schedule(dynamic, 32)
     for (size_t b = 0; b < weights->block_count; b++) {
         const alb_weight_block *block = &weights->blocks[b];
@@ -85,10 +86,12 @@ void alb_weights_add(double (*out)[3], const alb_weights *weights, const alb_for
 
 void alb_weights_free(alb_weights *weights)
 {
-    for (size_t b = 0; weights->blocks && b < weights->block_count; b++)
-        free(weights->blocks[b].sources);
     free(weights->blocks);
-    free(weights->left_shares);
+    free(weights->codes);
+    free(weights->gaps);
+    free(weights->clusters);
+    free(weights->parts);
+    free(weights->tops);
     free(weights->lights);
     *weights = (alb_weights){0};
 }
@@ -96,7 +99,7 @@ void alb_weights_free(alb_weights *weights)
 size_t alb_weights_bytes(const alb_weights *weights, const alb_forest *forest)
 {
     const alb_weight_block *block = weights->blocks;
-    return weights->block_count * sizeof *block +
-           weights->group_count * (ALB_WEIGHT_GROUP * sizeof *block->sources + sizeof *block->codes) +
-           forest->leaf_count * (sizeof *weights->left_shares + 2 * sizeof *weights->lights);
+    return weights->block_count * sizeof *block + weights->group_count * (sizeof *block->gaps + sizeof *block->codes) +
+           weights->part_count * sizeof *weights->parts + weights->top_count * sizeof *weights->tops +
+           (weights->clusters ? forest->cluster_count * (sizeof *weights->clusters + sizeof *weights->lights) : 0);
 }

@@ -2,24 +2,39 @@
 #pragma once
 #include "render/scatter_links.h"
 
-// Codes of eight bits, four of exponent and four of mantissa, shifted to their place in a float: 0, or from 2^-126 on.
-// Below 16 none but zero is used, for those would be denormal. Four sources share a word.
-enum { ALB_WEIGHT_GROUP = 4, ALB_WEIGHT_SHIFT = 19 };
+// A weight is a code of five bits, three of exponent and two of mantissa, shifted to its place in a float: 0, or from
+// 2^-126 on. Below 4 none but zero is used, for those would be denormal. Of each row and source those of R, G and B
+// stand beside each other in 16 bits, and two sources share a word.
+enum { ALB_WEIGHT_GROUP = 4, ALB_WEIGHT_BITS = 5, ALB_WEIGHT_SHIFT = 21 };
+enum { ALB_WEIGHT_PART = 2048 };       // leaves of a subtree, at most
+enum { ALB_WEIGHT_GROUPS_AHEAD = 24 }; // what a product asks memory for before it is there
 
-// What lights a block of exit patches: leaves below leaf_count, then nodes of the forest; the last group is filled up
-// with zeros. One allocation holds both.
+// What lights a block of exit patches: clusters of the forest, source k the one first_source + gaps[0] + ... + gaps[k].
+// Where a gap is too wide, sources of no weight stand between; the last group is filled up with them.
 typedef struct alb_weight_block {
-    uint32_t first_leaf, row_count, group_count;
-    float scales[3][ALB_BLOCK]; // of the sums of codes
-    uint32_t *sources;
-    uint32_t (*codes)[3][ALB_BLOCK]; // of each group
+    uint32_t first_leaf, row_count, group_count, first_source;
+    float scales[3][ALB_BLOCK];                         // of the sums of codes
+    uint32_t (*codes)[ALB_WEIGHT_GROUP / 2][ALB_BLOCK]; // of each group, as the gaps
+    uint16_t (*gaps)[ALB_WEIGHT_GROUP];
 } alb_weight_block;
+
+// How the light of a cluster comes about: the means of its children, the next cluster and the one here, by the left
+// one's part of the area; of a patch, below zero, that is the patch.
+typedef struct alb_weight_cluster {
+    uint32_t right;
+    float left_share;
+} alb_weight_cluster;
 
 typedef struct alb_weights {
     size_t block_count, group_count;
     alb_weight_block *blocks;
-    float *left_shares; // of nodes: the part of the area that the left child has
-    float (*lights)[4]; // of leaves and nodes: mean irradiance of R, G and B; workspace of a product
+    uint32_t (*codes)[ALB_WEIGHT_GROUP / 2][ALB_BLOCK]; // of all blocks, and ALB_WEIGHT_GROUPS_AHEAD beyond
+    uint16_t (*gaps)[ALB_WEIGHT_GROUP];
+    alb_weight_cluster *clusters; // of the forest
+    uint32_t (*parts)[2];         // first clusters and ends of subtrees that are summed on their own,
+    uint32_t *tops;               // and the clusters above them, in order
+    size_t part_count, top_count;
+    float (*lights)[4]; // of clusters, patches too: mean irradiance of R, G and B; workspace of a product
 } alb_weights;
 
 // From the links and kernels as they are. row_sums and local: of the patches. error_wanted: see

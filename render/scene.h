@@ -24,13 +24,14 @@
 //    "rays_per_patch": 256, "error_percent": 1, "memory_mb": 4096, "residual": 1e-4, "seed": 1, "frames": 1}
 // mm_per_unit 1, translate_mm 0, subdivide_mm none, grading 1, inward false, path "solid", blur_sd_mm 0, finish
 // "smooth", lights none, rays_per_patch 256, memory_mb 4096, residual 1e-4 and seed 1 are what stands where nothing is
-// written. rays_per_patch is 2 or more: its halves tell the error. With error_percent, rows start at rays_per_patch (64 where nothing is written) and grow until the rms error
-// of the irradiance by rays is that or every row has ALB_RAYS_REFINED_MAX. Rays beyond memory_mb lie in a temporary
-// file. With frames above 1 every run of # in the name of a file stands for the frame's number, 0 to frames - 1, with
-// zeros in front. For --method shadow objects take "shadow": "casts" (what stands where nothing is written) |
-// "receives" and "rigid": true for what moves as one body with all that is rigid, and an environment with radius_mm
-// lies on a sphere of that radius instead of infinitely far away. Paths are relative to the file. Units are the user's
-// as long as they agree: flux 1 makes the picture radiance per incident flux, 1/(mm^2 sr).
+// written. rays_per_patch is 2 or more: its halves tell the error. With error_percent, rows start at rays_per_patch (64
+// where nothing is written) and grow until the rms error of the irradiance by rays is that or every row has
+// ALB_RAYS_REFINED_MAX. Rays beyond memory_mb lie in a temporary file. With frames above 1 every run of # in the name
+// of a file stands for the frame's number, 0 to frames - 1, with zeros in front. For --method shadow objects take
+// "shadow": "casts" (what stands where nothing is written) | "receives" and "rigid": true for what moves as one body
+// with all that is rigid, and an environment with radius_mm lies on a sphere of that radius instead of infinitely far
+// away. Paths are relative to the file. Units are the user's as long as they agree: flux 1 makes the picture radiance
+// per incident flux, 1/(mm^2 sr).
 #pragma once
 #include "base/camera.h"
 #include "base/json.h"

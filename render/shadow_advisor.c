@@ -132,7 +132,7 @@ bool alb_shadow_advise(alb_shadow_stage *stage, alb_shadow_verdict *verdict, con
 {
     static const struct {
         int order, outer, inner, cells;
-    } ladder[] = {{4, 1, 0, 8}, {8, 1, 0, 8}, {4, 1, 2, 8}, {4, 2, 3, 8}, {6, 2, 6, 12}, {8, 3, 6, 16}};
+    } ladder[] = {{4, 1, 0, 8}, {8, 1, 0, 8}, {4, 1, 2, 8}, {4, 2, 3, 8}, {4, 1, 6, 10}, {6, 2, 6, 12}, {8, 3, 6, 16}};
     double best = INFINITY;
     for (size_t k = 0; k < sizeof ladder / sizeof *ladder; k++) {
         alb_shadow_settings settings = alb_shadow_defaults;
@@ -141,6 +141,7 @@ bool alb_shadow_advise(alb_shadow_stage *stage, alb_shadow_verdict *verdict, con
         settings.inner = ladder[k].inner;
         settings.far = ladder[k].inner > 0;
         settings.cells = ladder[k].cells;
+        settings.packed = ladder[k].cells > alb_shadow_defaults.cells;
         alb_shadow_stage_set(stage, &settings);
         if (!alb_shadow_stage_light(stage, scene, error) || !alb_shadow_error(verdict, stage, scene, seed, error))
             return false;

@@ -64,9 +64,54 @@ static void place_shells(alb_shadow_field *field)
         alb_shadow_shell *shell = &field->shells[i];
         *shell = shell_of(&field->settings, i);
         shell->first = field->sample_count;
-        field->sample_count += (size_t)alb_shadow_grid_count((alb_shadow_grid){shell->cells}) *
-                               (size_t)field->channels * alb_shadow_shell_values(shell);
+        field->sample_count +=
+            (size_t)alb_shadow_grid_count((alb_shadow_grid){shell->cells}) * alb_shadow_sample_size(field, shell);
     }
+}
+
+static size_t values_of(const alb_shadow_field *field, const alb_shadow_shell *shell)
+{
+    return (size_t)field->channels * alb_shadow_shell_values(shell);
+}
+
+size_t alb_shadow_sample_size(const alb_shadow_field *field, const alb_shadow_shell *shell)
+{
+    const size_t values = values_of(field, shell);
+    return field->settings.packed ? 1 + (values + sizeof(float) - 1) / sizeof(float) : values;
+}
+
+static float *find_sample(const alb_shadow_field *field, int shell, size_t node)
+{
+    const alb_shadow_shell *of = &field->shells[shell];
+    return field->samples + of->first + node * alb_shadow_sample_size(field, of);
+}
+
+void alb_shadow_sample_put(const alb_shadow_field *field, int shell, size_t node, const float *sample)
+{
+    const size_t values = values_of(field, &field->shells[shell]);
+    float *out = find_sample(field, shell, node), largest = 0;
+    if (!field->settings.packed) {
+        memcpy(out, sample, values * sizeof *out);
+        return;
+    }
+    for (size_t i = 0; i < values; i++)
+        largest = fmaxf(largest, fabsf(sample[i]));
+    *out = largest / 127;
+    int8_t *bytes = (int8_t *)(out + 1);
+    for (size_t i = 0; i < values; i++)
+        bytes[i] = (int8_t)(largest > 0 ? lrintf(sample[i] / largest * 127) : 0);
+}
+
+const float *alb_shadow_sample_get(float *space, const alb_shadow_field *field, int shell, size_t node)
+{
+    const float *kept = find_sample(field, shell, node);
+    if (!field->settings.packed)
+        return kept;
+    const int8_t *bytes = (const int8_t *)(kept + 1);
+    const size_t values = values_of(field, &field->shells[shell]);
+    for (size_t i = 0; i < values; i++)
+        space[i] = *kept * (float)bytes[i];
+    return space;
 }
 
 bool alb_shadow_field_create(alb_shadow_field *field, const alb_shadow_settings *settings, const alb_mesh *mesh,
@@ -137,8 +182,9 @@ static void at_turned(float *out, const alb_shadow_field *field, int shell, cons
     memset(out, 0, alb_shadow_shell_values(of) * sizeof *out);
     for (int k = 0; k < 4; k++) {
         const size_t n = (size_t)place->nodes[k];
-        add_turned(out, alb_shadow_sample_at(field, shell, n), of->order, place->weights[k], alb_times(-1, nodes[n]),
-                   axis);
+        float space[ALB_SH_COUNT_MAX];
+        add_turned(out, alb_shadow_sample_get(space, field, shell, n), of->order, place->weights[k],
+                   alb_times(-1, nodes[n]), axis);
     }
 }
 
@@ -150,10 +196,11 @@ void alb_shadow_field_at(float *out, const alb_shadow_field *field, int shell, a
         at_turned(out, field, shell, &place, direction);
         return;
     }
-    const size_t values = (size_t)field->channels * alb_shadow_shell_values(of);
+    const size_t values = values_of(field, of);
+    float space[4][3 * ALB_SH_COUNT_MAX];
     const float *from[4];
     for (int k = 0; k < 4; k++)
-        from[k] = alb_shadow_sample_at(field, shell, (size_t)place.nodes[k]);
+        from[k] = alb_shadow_sample_get(space[k], field, shell, (size_t)place.nodes[k]);
     for (size_t i = 0; i < values; i++)
         out[i] = place.weights[0] * from[0][i] + place.weights[1] * from[1][i] + place.weights[2] * from[2][i] +
                  place.weights[3] * from[3][i];

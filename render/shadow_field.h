@@ -28,6 +28,7 @@ typedef struct alb_shadow_settings {
                      // matter more than nodes do; occlusion only
     int rays;        // from each inner node
     int probes;      // on the object's own surface (shadow_surface.h), 0 to ALB_SHADOW_PROBES_MAX; occlusion only
+    bool packed;     // samples as bytes: a third of the memory at order 4, off by 1/254 of their largest coefficient
     double cluster;  // vertices within about so many radii move as one in pictures from outside; 0: each for itself
 } alb_shadow_settings;
 // Order 4, 8 cells, 64 pixels, one shell at 1.1 radii, none inside or far, 256 rays, 1200 probes, 0.04.
@@ -47,7 +48,7 @@ typedef struct alb_shadow_field {
     int channels;                                   // 1: occlusion, 3: radiance
     int shell_count;                                // inner + outer + far
     alb_shadow_shell shells[ALB_SHADOW_SHELLS_MAX]; // by radius, ascending
-    float *samples;                                 // [shell][node][channel][order^2]
+    float *samples;                                 // [shell][node], each as alb_shadow_sample_put has it
     size_t sample_count;                            // floats
     size_t moved;                     // inner nodes that lie inside the object: they see from just outside of it
     struct alb_shadow_studio *studio; // what pictures are taken with

@@ -29,7 +29,7 @@ static void take_picture(const alb_shadow_field *field, int shell, size_t n)
                                   s->shape.closed, lens);
     const size_t values = (size_t)(field->channels * lens->values);
     if (field->shells[shell].turns)
-        memcpy(alb_shadow_sample_at(field, shell, n), out, values * sizeof *out);
+        alb_shadow_sample_put(field, shell, n, out);
     for (size_t i = 0; !field->shells[shell].turns && i < values; i++)
         s->local[i * of->count + n] = out[i];
 }
@@ -42,12 +42,17 @@ static void sample_outside(const alb_shadow_field *field, int shell)
 #pragma omp parallel for schedule(dynamic, 8) num_threads(s->work_count)
     for (size_t n = 0; n < count; n++)
         take_picture(field, shell, n);
-    for (size_t c = 0; !field->shells[shell].turns && c < (size_t)field->channels; c++) {
+    if (field->shells[shell].turns)
+        return;
+    for (size_t c = 0; c < (size_t)field->channels; c++) {
         float *local = s->local + c * values * count;
         alb_sh_from_axis_batch(local, local, field->shells[shell].order, of->axes, count, count);
-        for (size_t n = 0; n < count; n++)
-            for (size_t i = 0; i < values; i++)
-                alb_shadow_sample_at(field, shell, n)[c * values + i] = local[i * count + n];
+    }
+    for (size_t n = 0; n < count; n++) {
+        float sample[3 * ALB_SH_COUNT_MAX];
+        for (size_t i = 0; i < values * (size_t)field->channels; i++)
+            sample[i] = s->local[i * count + n];
+        alb_shadow_sample_put(field, shell, n, sample);
     }
 }
 
@@ -60,9 +65,11 @@ static void sample_shell_inside(alb_shadow_field *field, int shell, const alb_tr
 #pragma omp parallel for schedule(dynamic, 8) reduction(+ : moved)
     for (size_t n = 0; n < of->count; n++) {
         alb_vector at = alb_add(field->sphere.centre_mm, alb_times(away_mm, of->directions[n]));
+        float sample[ALB_SH_COUNT_MAX];
         int moves = 0;
-        while (!alb_shadow_lattice_look(alb_shadow_sample_at(field, shell, n), &at, &s->rays, tracer) && moves < MOVES)
+        while (!alb_shadow_lattice_look(sample, &at, &s->rays, tracer) && moves < MOVES)
             moves++;
+        alb_shadow_sample_put(field, shell, n, sample);
         moved += moves > 0;
     }
     field->moved += moved;

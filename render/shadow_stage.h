@@ -9,6 +9,7 @@ typedef struct alb_shadow_stage {
     uint32_t (*faces)[3];         // of the scene for which the fields were made
     uint16_t *groups;
     size_t face_count, vertex_count;
+    bool under_skies;             // whether there were any: without them shells that lights make no use of are left out
     alb_shadow_field *fields;     // of the occluders and then of the lights
     alb_shadow_emitter *emitters; // of the lights, unless as printed
     size_t *objects;              // index of each in the scene

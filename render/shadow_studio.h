@@ -38,8 +38,10 @@ static inline size_t alb_shadow_shell_values(const alb_shadow_shell *shell)
     return (size_t)(shell->order * shell->order);
 }
 
-static inline float *alb_shadow_sample_at(const alb_shadow_field *field, int shell, size_t node)
-{
-    const alb_shadow_shell *of = &field->shells[shell];
-    return field->samples + of->first + node * (size_t)field->channels * alb_shadow_shell_values(of);
-}
+// Floats that a node's sample takes up.
+size_t alb_shadow_sample_size(const alb_shadow_field *field, const alb_shadow_shell *shell);
+// Keeps the sample[channel][order^2] of a node: as it is, or packed: the largest coefficient / 127, then a signed byte
+// for each.
+void alb_shadow_sample_put(const alb_shadow_field *field, int shell, size_t node, const float *sample);
+// The sample: in place, or unpacked to `space`, which holds 3 ALB_SH_COUNT_MAX.
+const float *alb_shadow_sample_get(float *space, const alb_shadow_field *field, int shell, size_t node);

@@ -18,7 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WAYS = 11, PLACES = 15, RECEIVERS = 64, RAYS = 8192, FULL = 16, FULL_RAYS = 512, RANGES = 4 };
+enum { WAYS = 13, PLACES = 15, RECEIVERS = 64, RAYS = 8192, FULL = 16, FULL_RAYS = 512, RANGES = 4 };
 static const double places[PLACES] = {.4, .54, .62, .7, .78, .86, 1, 1.15, 1.3, 1.6, 2, 2.7, 4, 5.5, 8};
 static const double range_ends[RANGES][2] = {{.5, .9}, {1, 2}, {2.7, 8}, {.4, 8}};
 static const struct {
@@ -27,17 +27,20 @@ static const struct {
     int order, outer, inner;
     bool far;
     int cells;
-} ways[WAYS] = {{"1 shell, as printed", true, 4, 1, 0, false, 8},
-                {"1 shell", false, 4, 1, 0, false, 8},
-                {"2 shells", false, 4, 1, 1, false, 8},
-                {"4 shells, near", false, 4, 2, 2, false, 8},
-                {"4 shells", false, 4, 1, 2, true, 8},
-                {"5 shells", false, 4, 1, 3, true, 8},
-                {"6 shells", false, 4, 1, 4, true, 8},
-                {"8 shells", false, 4, 1, 6, true, 8},
-                {"8 shells, 12 cells", false, 4, 1, 6, true, 12},
-                {"16 shells, uniform", false, 4, 0, 0, false, 8},
-                {"left out", false, 4, 0, 0, false, 8}};
+    bool packed;
+} ways[WAYS] = {{"1 shell, as printed", true, 4, 1, 0, false, 8, false},
+                {"1 shell", false, 4, 1, 0, false, 8, false},
+                {"2 shells", false, 4, 1, 1, false, 8, false},
+                {"4 shells, near", false, 4, 2, 2, false, 8, false},
+                {"4 shells", false, 4, 1, 2, true, 8, false},
+                {"5 shells", false, 4, 1, 3, true, 8, false},
+                {"6 shells", false, 4, 1, 4, true, 8, false},
+                {"8 shells", false, 4, 1, 6, true, 8, false},
+                {"8 shells, 12 cells", false, 4, 1, 6, true, 12, false},
+                {"8 shells, 10 cells, bytes", false, 4, 1, 6, true, 10, true},
+                {"8 shells, 12 cells, bytes", false, 4, 1, 6, true, 12, true},
+                {"16 shells, uniform", false, 4, 0, 0, false, 8, false},
+                {"left out", false, 4, 0, 0, false, 8, false}};
 
 typedef struct ball {
     double x, y, radius;
@@ -196,6 +199,7 @@ static bool measure(object *o, int way, alb_error *error)
     bool ok = true;
     settings.order = ways[way].order, settings.outer = ways[way].outer, settings.inner = ways[way].inner;
     settings.far = ways[way].far, settings.cells = ways[way].cells;
+    settings.packed = ways[way].packed;
     if (settings.outer)
         ok = alb_shadow_laws_create(&laws, settings.order, ways[way].paper, error) &&
              alb_shadow_field_create(&field, &settings, &o->mesh, NULL, "model", error);
@@ -271,13 +275,13 @@ int main(int argc, char **argv)
     static object objects[OBJECTS];
     alb_error error = {0};
     bool ok = true;
-    printf("%-8s %-20s %9s %9s %9s %9s %9s %9s\n", "", "distance", ".5 - .9", "1 - 2", "2.7 - 8", "all", "memory",
+    printf("%-8s %-25s %9s %9s %9s %9s %9s %9s\n", "", "distance", ".5 - .9", "1 - 2", "2.7 - 8", "all", "memory",
            "ms");
     for (int s = 0; ok && s < OBJECTS; s++) {
         ok = create(&objects[s], s, &error);
         for (int w = 0; ok && w < WAYS; w++) {
             ok = measure(&objects[s], w, &error);
-            printf("%-8s %-20s", objects[s].name, ways[w].name);
+            printf("%-8s %-25s", objects[s].name, ways[w].name);
             for (int k = 0; k < RANGES; k++)
                 printf(" %9.4f", over_range(&objects[s], w, range_ends[k]));
             printf(" %9.3f %9.2f\n", objects[s].memory[w], objects[s].sampling_ms[w]);

@@ -68,7 +68,7 @@ static void solutions_can_change(void **state)
     alb_scene_free(&scene);
 }
 
-static void narrow_relighting_states_its_error(void **state)
+static void relighting_states_its_error(void **state)
 {
     (void)state;
     alb_error error = {0};
@@ -78,17 +78,17 @@ static void narrow_relighting_states_its_error(void **state)
     room(&scene);
     check_ok(alb_solution_create(&s, &scene, &error), &error);
     alb_rgb *found = calloc(s.patches.count, sizeof *found);
-    const int ranks[3] = {8, 64, 64};
-    for (int k = 0; k < 3; k++) { // the last with an exact bounce
-        check_ok(alb_relight_create(&narrow[k], &s.equations, &s.patches, ranks[k], k == 2, 7, &error), &error);
+    const int ranks[3] = {0, 8, 64};
+    for (int k = 0; k < 3; k++) {
+        check_ok(alb_relight_create(&narrow[k], &s.equations, &s.patches, ranks[k], 7, &error), &error);
         alb_relight_apply(found, &narrow[k], (const alb_rgb *)s.irradiance);
         for (size_t p = 0; p < s.patches.count; p++)
             for (int c = 0; c < 3; c++) // lamps that light directly are no part of it
                 found[p][c] += s.lamps_direct ? s.exitance[p][c] : 0;
         const double percent = 100 * difference(&s, (const alb_rgb *)found, (const alb_rgb *)s.radiosity);
         check_below(percent, 2 * narrow[k].worst_percent); // lights of its own are no harder than these
-        if (k)                                             // more columns, less error; a bounce more, much less
-            check_below(narrow[k].error_percent, 0.6 * narrow[k - 1].error_percent);
+        if (k)                                             // more columns, less error
+            check_below(narrow[k].error_percent, 0.8 * narrow[k - 1].error_percent);
     }
     check_below(narrow[2].error_percent, 2); // 256 rays hold reciprocity to about 1 % on a mesh of 1,000
     // linear, to the step of 16 bits
@@ -106,10 +106,8 @@ static void narrow_relighting_states_its_error(void **state)
     alb_relight_apply(light, &narrow[2], (const alb_rgb *)s.irradiance);
     omp_set_num_threads(threads);
     assert_memory_equal(light, found, s.patches.count * sizeof *found);
-    check_fails(alb_relight_create(&none, &s.equations, &s.patches, 0, false, 7, &error), &error, ALB_BAD_DATA,
-                "0 columns");
-    check_fails(alb_relight_create(&none, &s.equations, &s.patches, 513, false, 7, &error), &error, ALB_BAD_DATA,
-                "at most");
+    check_fails(alb_relight_create(&none, &s.equations, &s.patches, -1, 7, &error), &error, ALB_BAD_DATA, "-1 columns");
+    check_fails(alb_relight_create(&none, &s.equations, &s.patches, 513, 7, &error), &error, ALB_BAD_DATA, "at most");
     for (int k = 0; k < 3; k++)
         alb_relight_free(&narrow[k]);
     free(found);
@@ -119,11 +117,61 @@ static void narrow_relighting_states_its_error(void **state)
     alb_scene_free(&scene);
 }
 
+// Every patch is in one receiver, rows hold, and with nothing to be missed receivers are patches with their own rays.
+static void receivers_hold_energy(void **state)
+{
+    (void)state;
+    enum { LIGHTS = 3 };
+    alb_error error = {0};
+    alb_scene scene;
+    alb_solution s;
+    room(&scene);
+    check_ok(alb_solution_create(&s, &scene, &error), &error);
+    const size_t n = s.patches.count;
+    alb_rgb *lights[LIGHTS], *out = calloc(n, sizeof *out);
+    const double lengths[LIGHTS][3] = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
+    for (int k = 0; k < LIGHTS; k++) {
+        alb_random random = alb_random_at(11, 0, (uint64_t)k);
+        lights[k] = calloc(n, sizeof *lights[k]);
+        for (size_t p = 0; p < n; p++)
+            for (int c = 0; c < 3; c++)
+                lights[k][p][c] = alb_random_uniform(&random);
+    }
+    const double wanted[2] = {INFINITY, 0};
+    for (int fine = 0; fine < 2; fine++) {
+        alb_receivers receivers;
+        check_ok(alb_receivers_create(&receivers, &s.equations, lights, lengths, LIGHTS, wanted[fine], &error), &error);
+        int *seen = calloc(n, sizeof *seen);
+        for (size_t i = 0; i < receivers.first[receivers.count]; i++)
+            seen[receivers.members[i]]++;
+        for (size_t p = 0; p < n; p++) {
+            assert_int_equal(seen[p], 1);
+            for (int c = 0; c < 3; c++)
+                receivers.values[p][c] = fine ? (float)lights[0][p][c] : 1;
+        }
+        alb_receivers_gather(&receivers);
+        if (fine)
+            alb_form_factors_apply_rows(out, &s.factors, (const alb_rgb *)lights[0]);
+        for (size_t r = 0; r < receivers.count; r++) {
+            check_near(receivers.gathered[r][1], fine ? out[receivers.members[receivers.first[r]]][1] : 1, 1e-6);
+            assert_in_range(receivers.first[r + 1] - receivers.first[r], 1, fine ? 1 : ALB_RECEIVER_PATCHES);
+        }
+        free(seen);
+        alb_receivers_free(&receivers);
+    }
+    for (int k = 0; k < LIGHTS; k++)
+        free(lights[k]);
+    free(out);
+    alb_solution_free(&s);
+    alb_scene_free(&scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solutions_can_change),
-        cmocka_unit_test(narrow_relighting_states_its_error),
+        cmocka_unit_test(relighting_states_its_error),
+        cmocka_unit_test(receivers_hold_energy),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -511,6 +511,49 @@ static void same_bytes_with_any_threads(void **state)
     alb_mesh_free(&mesh);
 }
 
+// Packed or not, every node's sample is the same within half a step of its largest coefficient; a flat square, which
+// nodes in its plane do not see, stays unseen from there.
+static void packed_samples_stay_within_a_step(void **state)
+{
+    (void)state;
+    for (int flat = 0; flat < 2; flat++) {
+        alb_error error = {0};
+        alb_mesh mesh = {0};
+        if (!flat)
+            sphere(&mesh, (alb_vector){-4, 1, 0}, 3, 3);
+        for (int k = 0; k < 4; k++)
+            check_ok(alb_mesh_add_vertex(&mesh, (alb_vector){k % 2, k / 2, 0}, &error), &error);
+        const uint32_t first = (uint32_t)mesh.vertex_count - 4;
+        check_ok(alb_mesh_add_face(&mesh, first, first + 1, first + 3, 0, &error), &error);
+        check_ok(alb_mesh_add_face(&mesh, first, first + 3, first + 2, 0, &error), &error);
+        alb_shadow_settings settings = alb_shadow_defaults;
+        settings.inner = flat ? 0 : 2, settings.far = true;
+        settings.order = flat ? 5 : 4; // 25 bytes do not fill floats
+        alb_shadow_field plain = field_of(&mesh, &settings);
+        settings.packed = true;
+        alb_shadow_field packed = field_of(&mesh, &settings);
+        assert_true((double)alb_shadow_field_bytes(&packed) < 0.33 * (double)alb_shadow_field_bytes(&plain));
+        size_t unseen = 0;
+        for (int shell = 0; shell < plain.shell_count; shell++)
+            for (int n = 0; n < alb_shadow_grid_count((alb_shadow_grid){plain.shells[shell].cells}); n++) {
+                const size_t values = (size_t)(plain.shells[shell].order * plain.shells[shell].order);
+                const alb_vector d = alb_shadow_grid_direction((alb_shadow_grid){plain.shells[shell].cells}, n);
+                float a[ALB_SH_COUNT_MAX], b[ALB_SH_COUNT_MAX], largest = 0;
+                alb_shadow_field_at(a, &plain, shell, d);
+                alb_shadow_field_at(b, &packed, shell, d);
+                for (size_t i = 0; i < values; i++)
+                    largest = fmaxf(largest, fabsf(a[i]));
+                unseen += !(largest > 0);
+                for (size_t i = 0; i < values; i++) // interpolation at a node leaves a trace of its neighbours
+                    check_near((double)b[i], (double)a[i], (0.5 / 127 + 1e-4) * (double)largest);
+            }
+        assert_true((unseen > 0) == (flat > 0));
+        alb_shadow_field_free(&plain);
+        alb_shadow_field_free(&packed);
+        alb_mesh_free(&mesh);
+    }
+}
+
 // Clusters of vertices change pictures by less than the pixels do.
 static void clusters_keep_the_silhouette(void **state)
 {
@@ -561,6 +604,7 @@ int main(void)
         cmocka_unit_test(degenerate_meshes),
         cmocka_unit_test(moving_bounding_sphere),
         cmocka_unit_test(same_bytes_with_any_threads),
+        cmocka_unit_test(packed_samples_stay_within_a_step),
         cmocka_unit_test(clusters_keep_the_silhouette),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -217,6 +217,28 @@ static void says_what_error_it_makes(void **state)
     alb_scene_free(&scene);
 }
 
+// Without skies shells that lines of sight to a light make no use of are not sampled; with the first sky they are.
+static void lights_alone_need_fewer_shells(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_scene scene;
+    alb_light sky = {.kind = ALB_LIGHT_ENVIRONMENT, .radiance = {1, 1, 1}};
+    check_ok(shadow_scenes[1].create(&scene, 0, &error), &error);
+    alb_light *const none = scene.lights;
+    assert_int_equal(scene.light_count, 0);
+    alb_shadow_stage stage = {.settings = alb_shadow_defaults};
+    stage.settings.inner = 1, stage.settings.outer = 2, stage.settings.far = true;
+    check_ok(alb_shadow_stage_light(&stage, &scene, &error), &error);
+    assert_int_equal(stage.fields[0].shell_count, 2);
+    scene.lights = &sky, scene.light_count = 1;
+    check_ok(alb_shadow_stage_light(&stage, &scene, &error), &error);
+    assert_int_equal(stage.fields[0].shell_count, 4);
+    scene.lights = none, scene.light_count = 0;
+    alb_shadow_stage_free(&stage);
+    alb_scene_free(&scene);
+}
+
 static void four_scenes_have_their_counts(void **state)
 {
     (void)state;
@@ -246,9 +268,13 @@ static void four_scenes_have_their_counts(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(reads_its_keys),           cmocka_unit_test(frames_are_numbered),
-        cmocka_unit_test(refuses_what_is_wrong),    cmocka_unit_test(renders_a_sequence),
-        cmocka_unit_test(says_what_error_it_makes), cmocka_unit_test(four_scenes_have_their_counts),
+        cmocka_unit_test(reads_its_keys),
+        cmocka_unit_test(frames_are_numbered),
+        cmocka_unit_test(refuses_what_is_wrong),
+        cmocka_unit_test(renders_a_sequence),
+        cmocka_unit_test(says_what_error_it_makes),
+        cmocka_unit_test(four_scenes_have_their_counts),
+        cmocka_unit_test(lights_alone_need_fewer_shells),
     };
     return cmocka_run_group_tests(tests, enter_folder, leave_folder);
 }
