@@ -92,7 +92,7 @@ static void warn(const alb_scene *scene, const alb_solution *s)
         fprintf(stderr,
                 "render: %.2f %% of the rays between patches meet the back of a patch, which is black; is a mesh open "
                 "or turned?\n",
-                100.0 * (double)s->factors.back_rays / (double)s->factors.rows.first[s->patches.count]);
+                100.0 * (double)s->factors.back_rays / (double)alb_hit_rows_rays(&s->factors.rows));
     for (size_t b = 0; b < s->scatter.body_count; b++)
         open += !s->scatter.bodies[b].closed;
     if (open)
@@ -117,7 +117,7 @@ static bool print_json(const alb_scene *scene, const alb_solution *s, double vie
     alb_json_integer(&json, "turned_faces", (long)scene->mesh.turned);
     alb_json_integer(&json, "culled_patches", (long)s->patches.culled);
     alb_json_integer(&json, "rays_per_patch", s->factors.rays);
-    alb_json_integer(&json, "rays", (long)s->factors.rows.first[s->patches.count]);
+    alb_json_integer(&json, "rays", (long)alb_hit_rows_rays(&s->factors.rows));
     alb_json_integer(&json, "rays_cast_again", (long)s->factors.reshot_rays);
     alb_json_integer(&json, "links", (long)s->scatter.link_count);
     alb_json_integer(&json, "iterations", s->report.iterations);

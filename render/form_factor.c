@@ -1,13 +1,13 @@
 // F_kj, the share of the flux leaving k that arrives at j, by R cosine-weighted rays from every patch:
 //     F_kj = (number of rays of k that hit j) / R
-// (render/form_factor_cast.c: their pattern; render/form_factor_rows.c: how they are kept and multiplied;
-// render/form_factor_share.c: what neighbours have in common.)
-// A row of F only ever integrates a bounded function over the hemisphere, which is why a few hundred equal weights do
-// for any number of patches. The rows hold exactly (they sum to 1 with the sky); reciprocity A_k F_kj = A_j F_jk holds
-// only statistically. Never symmetrised or normalised: that raises the error. Exact factors (form_factor_exact.h) for
-// the pairs within three sizes, rays scaled to the rest of 1, change it by -8 to +5 % of itself (measured in empty
-// rooms of 768 and 6,912 patches): not worth a weight a pair. Where it stops being true: sources that cover less than
-// ~1/R of a hemisphere (a small bright lamp) are seen by few rays.
+// (render/form_factor_cast.c: their pattern; render/form_factor_rows.c: how they are kept;
+// render/form_factor_product.c: their product; render/form_factor_share.c: what neighbours have in common.) A row of F
+// only ever integrates a bounded function over the hemisphere, which is why a few hundred equal weights do for any
+// number of patches. The rows hold exactly (they sum to 1 with the sky); reciprocity A_k F_kj = A_j F_jk holds only
+// statistically. Never symmetrised or normalised: that raises the error. Exact factors (form_factor_exact.h) for the
+// pairs within three sizes, rays scaled to the rest of 1, change it by -8 to +5 % of itself (measured in empty rooms of
+// 768 and 6,912 patches): not worth a weight a pair. Where it stops being true: sources that cover less than ~1/R of a
+// hemisphere (a small bright lamp) are seen by few rays.
 #include "render/form_factor.h"
 #include "base/memory.h"
 #include "base/progress.h"
@@ -20,13 +20,13 @@
 // Where the bits of a chunk begin, in words: chunks share none.
 static size_t first_word(const alb_form_factors *factors, size_t chunk)
 {
-    return factors->rows.first[chunk * ALB_CHUNK_ROWS] / 64 + chunk;
+    return factors->rows.first[chunk] / 64 + chunk;
 }
 
 static uint64_t *sky_word(const alb_form_factors *factors, size_t patch, size_t q, uint64_t *bit)
 {
     const size_t chunk = patch / ALB_CHUNK_ROWS;
-    const size_t ray = factors->rows.first[patch] - factors->rows.first[chunk * ALB_CHUNK_ROWS] + q;
+    const size_t ray = factors->rows.starts[chunk * (ALB_CHUNK_ROWS + 1) + patch % ALB_CHUNK_ROWS] + q;
     *bit = 1ULL << ray % 64;
     return factors->sky_mask + first_word(factors, chunk) + ray / 64;
 }
@@ -80,13 +80,13 @@ static bool allocate(alb_form_factors *factors, const uint32_t *lengths, alb_err
            (factors->sky_shares = alb_allocate(n, sizeof(float), error)) &&
            (factors->back_shares = alb_allocate(n, sizeof(float), error)) &&
            (factors->gathered = alb_allocate(n + 2, sizeof *factors->gathered, error)) &&
-           (factors->sky_mask =
-                alb_allocate(factors->rows.first[n] / 64 + factors->rows.chunks + 1, sizeof *factors->sky_mask, error));
+           (factors->sky_mask = alb_allocate(alb_hit_rows_rays(&factors->rows) / 64 + factors->rows.chunks + 1,
+                                             sizeof *factors->sky_mask, error));
 }
 
 // Where the hits come from: given in `hits`, or cast.
 typedef struct source {
-    const uint32_t *hits;
+    const uint32_t *hits; // row after row
     const alb_patches *patches;
     const alb_tracer *tracer;
     float *nearness_per_mm; // of each patch, on return, where they are cast
@@ -96,15 +96,30 @@ static void take_row(uint32_t *row, alb_form_factors *factors, const source *fro
 {
     const int rays = alb_form_factors_rays(factors, patch);
     if (from->hits) {
-        memcpy(row, from->hits + factors->rows.first[patch], (size_t)rays * sizeof *row);
+        memcpy(row, from->hits + patch * (size_t)rays, (size_t)rays * sizeof *row);
     } else {
-        const alb_ray_pattern pattern = {rays, factors->seed, factors->sampling};
+        const alb_ray_pattern pattern = {rays, factors->seed, factors->sampling, factors->phases};
         const size_t slipped = alb_rays_cast(row, &pattern, from->patches, from->tracer, patch);
         __atomic_add_fetch(&factors->reshot_rays, slipped, __ATOMIC_RELAXED); // counting is the same in any order
     }
     note_row(factors, row, patch);
     if (from->nearness_per_mm)
         from->nearness_per_mm[patch] = nearness_per_mm(factors, row, from->patches, patch);
+}
+
+// What no ray meets needs no shares.
+static void drop_unseen(alb_form_factors *factors)
+{
+    if (!factors->sky_rays) {
+        free(factors->sky_mask);
+        free(factors->sky_shares);
+        factors->sky_mask = NULL;
+        factors->sky_shares = NULL;
+    }
+    if (!factors->back_rays) {
+        free(factors->back_shares);
+        factors->back_shares = NULL;
+    }
 }
 
 static bool fill(alb_form_factors *factors, const source *from, alb_error *error)
@@ -132,10 +147,7 @@ static bool fill(alb_form_factors *factors, const source *from, alb_error *error
     alb_progress_end(&progress);
     free(hits);
     alb_hit_rows_trim(&factors->rows);
-    if (!factors->sky_rays) {
-        free(factors->sky_mask);
-        factors->sky_mask = NULL;
-    }
+    drop_unseen(factors);
     return true;
 }
 
@@ -143,24 +155,45 @@ static bool fill(alb_form_factors *factors, const source *from, alb_error *error
 static void share_open_rays(alb_form_factors *factors, double (*room)[3])
 {
     for (size_t p = 0; p < factors->patch_count; p++)
-        room[p][0] = (double)factors->sky_shares[p], room[p][1] = (double)factors->back_shares[p];
+        room[p][0] = alb_form_factors_sky_share(factors, p), room[p][1] = alb_form_factors_back_share(factors, p);
     alb_form_factors_share(room, factors);
-    for (size_t p = 0; p < factors->patch_count; p++)
-        factors->sky_shares[p] = (float)room[p][0], factors->back_shares[p] = (float)room[p][1];
+    for (size_t p = 0; p < factors->patch_count; p++) {
+        if (factors->sky_shares)
+            factors->sky_shares[p] = (float)room[p][0];
+        if (factors->back_shares)
+            factors->back_shares[p] = (float)room[p][1];
+    }
+}
+
+// Neighbours, their phases, and areas in units of the mean.
+static bool meet_neighbours(alb_form_factors *factors, const alb_patches *patches, alb_error *error)
+{
+    const size_t n = patches->count;
+    double sum_mm2 = 0;
+    if (!alb_row_shares_create(&factors->shares, patches, error) || !(factors->phases = alb_allocate(n, 1, error)))
+        return false;
+    alb_row_shares_phases(factors->phases, &factors->shares);
+    for (size_t p = 0; p < n; p++)
+        sum_mm2 += patches->areas_mm2[p];
+    for (size_t p = 0; p < n; p++)
+        factors->gathered[p][3] = (float)(patches->areas_mm2[p] * (double)n / sum_mm2);
+    return true;
 }
 
 static bool build(alb_form_factors *factors, const source *given, const uint32_t *lengths, alb_error *error)
 {
     source from = *given;
     double(*room)[3] = NULL;
-    bool ok = allocate(factors, lengths, error) &&
-              (!from.patches || ((from.nearness_per_mm = alb_allocate(factors->patch_count, sizeof(float), error)) &&
-                                 (room = alb_allocate(factors->patch_count, sizeof *room, error)))) &&
-              fill(factors, &from, error) &&
-              (!from.patches ||
-               alb_row_shares_create(&factors->shares, from.patches, factors->rows.first, from.nearness_per_mm, error));
-    if (ok && from.patches)
+    const bool ok =
+        allocate(factors, lengths, error) &&
+        (!from.patches || ((from.nearness_per_mm = alb_allocate(factors->patch_count, sizeof(float), error)) &&
+                           (room = alb_allocate(factors->patch_count, sizeof *room, error)) &&
+                           meet_neighbours(factors, from.patches, error))) &&
+        fill(factors, &from, error);
+    if (ok && from.patches) {
+        alb_row_shares_limit(&factors->shares, from.patches, &factors->rows, from.nearness_per_mm);
         share_open_rays(factors, room);
+    }
     free(from.nearness_per_mm);
     free(room);
     if (!ok)
@@ -227,15 +260,18 @@ void alb_form_factors_free(alb_form_factors *factors)
     free(factors->sky_shares);
     free(factors->back_shares);
     free(factors->sky_mask);
+    free(factors->phases);
     free(factors->gathered);
     *factors = (alb_form_factors){0};
 }
 
 size_t alb_form_factors_bytes(const alb_form_factors *factors)
 {
-    const size_t n = factors->patch_count, words = factors->rows.first[n] / 64 + factors->rows.chunks + 1;
-    return alb_hit_rows_bytes(&factors->rows) + alb_row_shares_bytes(&factors->shares) + 2 * n * sizeof(float) +
-           (n + 2) * sizeof *factors->gathered + (factors->sky_mask ? words * sizeof *factors->sky_mask : 0);
+    const size_t n = factors->patch_count, words = alb_hit_rows_rays(&factors->rows) / 64 + factors->rows.chunks + 1;
+    const size_t shares = (size_t)(factors->sky_shares != NULL) + (size_t)(factors->back_shares != NULL);
+    return alb_hit_rows_bytes(&factors->rows) + alb_row_shares_bytes(&factors->shares) + shares * n * sizeof(float) +
+           (factors->phases ? n : 0) + (n + 2) * sizeof *factors->gathered +
+           (factors->sky_mask ? words * sizeof *factors->sky_mask : 0);
 }
 
 void alb_form_factors_row(uint32_t *hits, const alb_form_factors *factors, size_t patch)
@@ -245,7 +281,8 @@ void alb_form_factors_row(uint32_t *hits, const alb_form_factors *factors, size_
 
 alb_vector alb_form_factors_direction(const alb_form_factors *factors, const alb_patches *patches, size_t patch, int q)
 {
-    const alb_ray_pattern pattern = {alb_form_factors_rays(factors, patch), factors->seed, factors->sampling};
+    const alb_ray_pattern pattern = {alb_form_factors_rays(factors, patch), factors->seed, factors->sampling,
+                                     factors->phases};
     return alb_ray_direction(&pattern, patches, patch, q);
 }
 

@@ -15,10 +15,11 @@ typedef struct alb_form_factors {
     size_t memory_bytes;   // hits beyond it lie in a file; 0: no limit
     alb_hit_rows rows;     // of each patch: patch index; patch_count: the sky; patch_count + 1: the back of a patch
     alb_row_shares shares; // what neighbours gather in common
-    float *sky_shares, *back_shares;         // of each patch's rays and of those it shares
-    uint64_t *sky_mask;                      // of the rays in the order of rows.first, one bit each; NULL: no sky
+    float *sky_shares, *back_shares;         // of each patch's rays and of those it shares; NULL: none
+    uint8_t *phases;                         // of the patches' lattices; NULL: turned at random
+    uint64_t *sky_mask;                      // of the rays in order, one bit each; NULL: no sky
     size_t sky_rays, back_rays, reshot_rays; // in all; reshot: slipped through a crack, and cast again
-    float (*gathered)[4];                    // scratch of the products: radiosity of the patches, the sky and backs
+    float (*gathered)[4]; // scratch of the products: radiosity of the patches, the sky and backs; areas
 } alb_form_factors;
 
 // Casts `rays` rays (1..ALB_RAYS_MAX) from every patch. A ray that leaves the scene points to the sky. One that meets
@@ -43,7 +44,15 @@ size_t alb_form_factors_bytes(const alb_form_factors *factors);
 // Rays of the patch.
 static inline int alb_form_factors_rays(const alb_form_factors *factors, size_t patch)
 {
-    return (int)(factors->rows.first[patch + 1] - factors->rows.first[patch]);
+    return (int)alb_hit_rows_length(&factors->rows, patch);
+}
+static inline double alb_form_factors_sky_share(const alb_form_factors *factors, size_t patch)
+{
+    return factors->sky_shares ? (double)factors->sky_shares[patch] : 0;
+}
+static inline double alb_form_factors_back_share(const alb_form_factors *factors, size_t patch)
+{
+    return factors->back_shares ? (double)factors->back_shares[patch] : 0;
 }
 // What they hit: the even rays, ascending, then the odd ones, ascending. `hits` has room for all of them.
 void alb_form_factors_row(uint32_t *hits, const alb_form_factors *factors, size_t patch);

@@ -5,10 +5,13 @@
 
 typedef enum alb_sampling { ALB_SAMPLING_LATTICE, ALB_SAMPLING_RANDOM } alb_sampling;
 
+enum { ALB_RAY_PHASES = 9 };
+
 typedef struct alb_ray_pattern {
     int rays; // a patch
     uint64_t seed;
     alb_sampling sampling;
+    const uint8_t *phases; // of each patch, below ALB_RAY_PHASES, of one lattice; NULL: turned at random
 } alb_ray_pattern;
 
 alb_vector alb_ray_direction(const alb_ray_pattern *pattern, const alb_patches *patches, size_t patch, int q);

@@ -48,7 +48,7 @@ static void mean_squares(double out[WAYS][3], const rgb *irradiance, const alb_f
     memset(out, 0, WAYS * sizeof *out);
     for (size_t p = 0; p < factors->patch_count; p++)
         for (int c = 0; c < 3; c++) {
-            const double all = irradiance[p][c] + (sky ? sky[c] * (double)factors->sky_shares[p] : 0);
+            const double all = irradiance[p][c] + (sky ? sky[c] * alb_form_factors_sky_share(factors, p) : 0);
             for (int way = 0; way < WAYS; way++)
                 out[way][c] += weight(factors, p, way, mean_mm2) * all * all / (double)factors->patch_count;
         }

@@ -70,7 +70,7 @@ static void random_light(maker *m, uint64_t stream, int index)
                      spot = fmax(0, facing) * exp(-alb_dot(aside, aside) / (size_mm * size_mm)),
                      point = fmax(0, alb_dot(alb_unit(to), patches->normals[p])) /
                              fmax(alb_dot(to, to), 0.01 * size_mm * size_mm),
-                     sky = (double)factors->sky_shares[p] * (1 + 0.6 * facing);
+                     sky = alb_form_factors_sky_share(factors, p) * (1 + 0.6 * facing);
         for (int c = 0; c < 3; c++)
             out[p][c] = colour[c] * (kind == 1 ? point : kind == 2 ? sky : spot);
     }

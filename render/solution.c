@@ -86,8 +86,8 @@ static void take_balance(alb_solution *s, const double (*irradiance)[3])
             s->column_sum = fmax(s->column_sum, kept[p][c]);
             s->balance.in[c] += area * (s->irradiance[p][c] + (s->lamps_direct ? 0 : s->exitance[p][c]));
             s->balance.absorbed[c] += area * (1 - kept[p][c]) * irradiance[p][c];
-            s->balance.escaped[c] += area * s->radiosity[p][c] * (double)s->factors.sky_shares[p];
-            s->balance.lost[c] += area * s->radiosity[p][c] * (double)s->factors.back_shares[p];
+            s->balance.escaped[c] += area * s->radiosity[p][c] * alb_form_factors_sky_share(&s->factors, p);
+            s->balance.lost[c] += area * s->radiosity[p][c] * alb_form_factors_back_share(&s->factors, p);
         }
 }
 
@@ -182,7 +182,7 @@ static bool refine_rays(alb_solution *s, const alb_scene *scene, alb_error *erro
 {
     double sky[3];
     const double start_s = alb_clock_s();
-    const size_t rays = s->factors.rows.first[s->patches.count];
+    const size_t rays = alb_hit_rows_rays(&s->factors.rows);
     sky_radiosity(sky, scene);
     const bool ok =
         alb_form_factors_refine(NULL, &s->factors, &s->patches, &s->tracer, (const double(*)[3])s->radiosity, sky,
@@ -190,7 +190,7 @@ static bool refine_rays(alb_solution *s, const alb_scene *scene, alb_error *erro
     s->bytes[ALB_STAGE_FORM_FACTORS] = ok ? alb_form_factors_bytes(&s->factors) : 0;
     s->seconds[ALB_STAGE_FORM_FACTORS] += alb_clock_s() - start_s;
     s->seconds[ALB_STAGE_SOLVE] -= alb_clock_s() - start_s;
-    if (!ok || s->factors.rows.first[s->patches.count] == rays)
+    if (!ok || alb_hit_rows_rays(&s->factors.rows) == rays)
         return ok;
     alb_radiosity_free(&s->equations);
     return (!s->factors.sky_rays || light_patches(s, scene, error)) &&

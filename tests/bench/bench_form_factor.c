@@ -1,8 +1,9 @@
 // Error of irradiance by rays against rays, time and bytes: a 4 x 4 x 4 room of 72,752 patches with a ball in it, a
 // smooth radiosity and two of two bright spots (3.1 % of the room): a corner of the ceiling and a disc of the floor,
 // under the ball or away from all. Truth: 65,536 rays of other random numbers on 500
-// rows. Lattice rays beside random ones (the baseline), and rays refined for a stated error. Then view factors of
-// polygons against Howell's C-11 for gaps of 1e-3 to 1e3 of the size.
+// rows. Lattice rays beside random ones (the baseline), and rays refined for a stated error. One draw of the rays is
+// luck: the rays that 500 bytes a patch hold, of eight seeds, by their median and range. Then view factors of polygons
+// against Howell's C-11 for gaps of 1e-3 to 1e3 of the size.
 //     bench.form_factor [CHART.svg]
 #include "base/plot.h"
 #include "base/progress.h"
@@ -13,7 +14,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETTINGS = 4, PATTERNS = 3, SAMPLED = 500, TRUTH_RAYS = 65536, PRODUCTS = 9, REFINED = 3 };
+enum {
+    SETTINGS = 4,
+    PATTERNS = 3,
+    SAMPLED = 500,
+    TRUTH_RAYS = 65536,
+    PRODUCTS = 9,
+    REFINED = 3,
+    SEEDS = 8,
+    FITTING = 227
+};
 
 static const int rays_of[SETTINGS] = {16, 64, 256, 1024};
 static const double asked_of[REFINED] = {10, 5, 2.5};
@@ -64,7 +74,7 @@ static bool build(bench *b, alb_error *error)
 
 static bool find_truth(bench *b, alb_error *error)
 {
-    const alb_ray_pattern pattern = {TRUTH_RAYS, 1000, ALB_SAMPLING_LATTICE};
+    const alb_ray_pattern pattern = {TRUTH_RAYS, 1000, ALB_SAMPLING_LATTICE, NULL};
     uint32_t *hits = calloc(TRUTH_RAYS, sizeof *hits);
     if (!hits)
         return alb_fail(error, ALB_NO_MEMORY, "out of memory for %d rays", TRUTH_RAYS);
@@ -95,7 +105,7 @@ static void measure(row *out, bench *b, const alb_form_factors *factors)
     }
     qsort(seconds, PRODUCTS, sizeof *seconds, by_value);
     out->product_ms = 1e3 * seconds[PRODUCTS / 2];
-    out->rays = (double)factors->rows.first[b->patches.count] / (double)b->patches.count;
+    out->rays = (double)alb_hit_rows_rays(&factors->rows) / (double)b->patches.count;
     out->bytes = (double)alb_form_factors_bytes(factors) / (double)b->patches.count;
     for (int c = 0; c < PATTERNS; c++) {
         double difference = 0, whole = 0;
@@ -145,6 +155,30 @@ static bool measure_refined(bench *b, int setting, alb_error *error)
     snprintf(name, sizeof name, "%g %%, states %.2f", asked_of[setting], stated);
     print_row(name, out);
     alb_form_factors_free(&factors);
+    return true;
+}
+
+static bool measure_seeds(bench *b, alb_error *error)
+{
+    double errors[PATTERNS][SEEDS];
+    row r = {0};
+    for (int seed = 0; seed < SEEDS; seed++) {
+        alb_form_factors factors;
+        if (!alb_form_factors_create(&factors, &b->patches, &b->tracer, FITTING, 7 + (uint64_t)seed,
+                                     ALB_SAMPLING_LATTICE, error))
+            return false;
+        measure(&r, b, &factors);
+        for (int c = 0; c < PATTERNS; c++)
+            errors[c][seed] = r.error_percent[c];
+        alb_form_factors_free(&factors);
+    }
+    printf("lattice, %d seeds: %.0f rays, %.0f bytes a patch; median [least, most]", SEEDS, r.rays, r.bytes);
+    for (int c = 0; c < PATTERNS; c++) {
+        qsort(errors[c], SEEDS, sizeof *errors[c], by_value);
+        printf("  %s %.2f [%.2f, %.2f]", pattern_names[c], 0.5 * (errors[c][SEEDS / 2 - 1] + errors[c][SEEDS / 2]),
+               errors[c][0], errors[c][SEEDS - 1]);
+    }
+    printf("\n");
     return true;
 }
 
@@ -230,7 +264,7 @@ int main(int argc, char **argv)
             ok = measure_even(b, sampling, k, &error);
     for (int k = 0; ok && k < REFINED; k++)
         ok = measure_refined(b, k, &error);
-    ok = ok && measure_exact(&error) && (argc < 2 || chart(b, argv[1], &error));
+    ok = ok && measure_seeds(b, &error) && measure_exact(&error) && (argc < 2 || chart(b, argv[1], &error));
     if (!ok)
         fprintf(stderr, "bench.form_factor: %s\n", error.text);
     free(b->radiosity);

@@ -28,7 +28,7 @@ static void gather(double out[3], const uint32_t *hits, size_t count, const rgb 
 // What some patches, drawn at random, receive.
 bool make_oracle(bench *b, const alb_scene *scene, const alb_solution *s, const rgb *radiosity, alb_error *error)
 {
-    const alb_ray_pattern pattern = {b->oracle_rays, 99, ALB_SAMPLING_LATTICE};
+    const alb_ray_pattern pattern = {b->oracle_rays, 99, ALB_SAMPLING_LATTICE, NULL};
     double sky[3];
     bool ok = true;
     sky_of(sky, scene);
@@ -43,7 +43,7 @@ bool make_oracle(bench *b, const alb_scene *scene, const alb_solution *s, const 
             gather(b->truth[k], hits, (size_t)pattern.rays, radiosity, sky, s->patches.count);
         }
         for (int c = 0; c < 3; c++)
-            b->direct[k][c] = s->irradiance[patch][c] - (double)s->factors.sky_shares[patch] * sky[c];
+            b->direct[k][c] = s->irradiance[patch][c] - alb_form_factors_sky_share(&s->factors, patch) * sky[c];
         free(hits);
     }
     return ok || alb_fail(error, ALB_NO_MEMORY, "out of memory for the oracle's rays");
@@ -58,7 +58,7 @@ void gather_all(rgb *out, const alb_scene *scene, const alb_solution *s, const a
     alb_form_factors_apply(out, factors, radiosity);
     for (size_t p = 0; p < s->patches.count; p++)
         for (int c = 0; c < 3; c++)
-            out[p][c] += (double)factors->sky_shares[p] * sky[c];
+            out[p][c] += alb_form_factors_sky_share(factors, p) * sky[c];
 }
 
 // rms of what was found on the oracle's rows against it, relative to all that falls there or to what comes by rays.

@@ -123,7 +123,7 @@ static void crack_between_walls(void **state)
         world_of(&w);
         for (size_t p = 0; p < w.patches.count; p++)
             for (uint64_t seed = 0; seed < (wide ? 1 : 8) && w.patches.normals[p].z > 0.9; seed++) {
-                const alb_ray_pattern pattern = {RAYS, seed, ALB_SAMPLING_LATTICE};
+                const alb_ray_pattern pattern = {RAYS, seed, ALB_SAMPLING_LATTICE, NULL};
                 slipped += alb_rays_cast(hits, &pattern, &w.patches, &w.tracer, p);
                 for (int q = 0; q < RAYS; q++)
                     sky += hits[q] == w.patches.count;
@@ -221,7 +221,7 @@ static double lit_share(const world *w, int rays, uint64_t seed)
     alb_form_factors f;
     cast(&f, w, rays, seed);
     assert_int_equal(f.back_rays, 0);
-    const double share = 1 - (double)f.sky_shares[0];
+    const double share = 1 - alb_form_factors_sky_share(&f, 0);
     alb_form_factors_free(&f);
     return share;
 }
@@ -312,7 +312,7 @@ static void sharp_bright_spot(void **state)
     alb_form_factors_apply(out, &f, (const rgb *)spot);
     check_below(rms_percent((const rgb *)out, (const rgb *)truth, n, STRIDE, 2), reached);
     print_message("64 rays %.2f %%, 256 rays %.2f %%, refined to 3 %%: %.0f rays a patch\n", found[0], found[1],
-                  (double)f.rows.first[n] / (double)n);
+                  (double)alb_hit_rows_rays(&f.rows) / (double)n);
     alb_form_factors_free(&f);
     free(spot);
     free(truth);

@@ -114,12 +114,73 @@ static void shared_rows_err_less(void **state)
     world_free(&w);
 }
 
+// Share of the cosine-weighted directions within a cap of half angle `half` whose axis leans by `lean` from the normal,
+// all above the plane: sin^2(half) cos(lean), exact. Rows of all phases, together, against as many turned at random.
+static void phases_together_are_one_finer_lattice(void **state)
+{
+    (void)state;
+    enum { CAPS = 400, RAYS = 256 };
+    world w;
+    uint8_t phases[ALB_RAY_PHASES];
+    double squares[2] = {0};
+    room_with_ball_create(&w, 16);
+    for (int k = 0; k < ALB_RAY_PHASES; k++)
+        phases[k] = (uint8_t)k;
+    for (uint64_t cap = 0; cap < CAPS; cap++) {
+        const double half = 0.1 + 0.3 * uniform(3, cap), lean = (M_PI / 2 - half) * uniform(4, cap),
+                     turn = 2 * M_PI * uniform(5, cap), truth = pow(sin(half), 2) * cos(lean);
+        alb_vector t, b;
+        const alb_vector n = w.patches.normals[0];
+        alb_tangents(&t, &b, n);
+        const alb_vector axis = alb_add(
+            alb_times(cos(lean), n), alb_add(alb_times(sin(lean) * cos(turn), t), alb_times(sin(lean) * sin(turn), b)));
+        for (int way = 0; way < 2; way++) {
+            const alb_ray_pattern pattern = {RAYS, cap, ALB_SAMPLING_LATTICE, way ? phases : NULL};
+            int inside = 0;
+            for (size_t p = 0; p < ALB_RAY_PHASES; p++)
+                for (int q = 0; q < RAYS; q++)
+                    inside += alb_dot(alb_ray_direction(&pattern, &w.patches, p, q), axis) > cos(half);
+            squares[way] += pow(inside / (double)(RAYS * ALB_RAY_PHASES) / truth - 1, 2);
+        }
+    }
+    check_below(sqrt(squares[1] / squares[0]), 0.8); // found: 0.61
+    world_free(&w);
+}
+
+// No patch has the phase of one across an edge, and few that of a neighbour's neighbour.
+static void neighbours_differ_in_phase(void **state)
+{
+    (void)state;
+    world w;
+    alb_row_shares shares;
+    alb_error error = {0};
+    size_t pairs = 0, alike = 0;
+    room_with_ball_create(&w, 16);
+    uint8_t *phases = calloc(w.patches.count, 1);
+    check_ok(alb_row_shares_create(&shares, &w.patches, &error), &error);
+    alb_row_shares_phases(phases, &shares);
+    for (size_t p = 0; p < w.patches.count; p++)
+        for (int i = 0; i < 9; i++) {
+            const uint32_t near = shares.neighbours[p][i / 3], next = shares.neighbours[near][i % 3];
+            assert_true(near == p || phases[near] != phases[p]);
+            pairs += next != p && next != near && near != p;
+            alike += next != p && next != near && near != p && phases[next] == phases[p];
+        }
+    assert_true(pairs > w.patches.count);
+    check_below((double)alike, 0.05 * (double)pairs);
+    alb_row_shares_free(&shares);
+    free(phases);
+    world_free(&w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sharing_keeps_constants_and_fluxes),
         cmocka_unit_test(bends_are_not_shared_across),
         cmocka_unit_test(shared_rows_err_less),
+        cmocka_unit_test(phases_together_are_one_finer_lattice),
+        cmocka_unit_test(neighbours_differ_in_phase),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
