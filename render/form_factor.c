@@ -1,13 +1,13 @@
 // F_kj, the share of the flux leaving k that arrives at j, by R cosine-weighted rays from every patch:
 //     F_kj = (number of rays of k that hit j) / R
-// (render/form_factor_cast.c: their pattern; render/form_factor_rows.c: how they are kept and multiplied;
-// render/form_factor_share.c: what neighbours have in common.)
-// A row of F only ever integrates a bounded function over the hemisphere, which is why a few hundred equal weights do
-// for any number of patches. The rows hold exactly (they sum to 1 with the sky); reciprocity A_k F_kj = A_j F_jk holds
-// only statistically. Never symmetrised or normalised: that raises the error. Exact factors (form_factor_exact.h) for
-// the pairs within three sizes, rays scaled to the rest of 1, change it by -8 to +5 % of itself (measured in empty
-// rooms of 768 and 6,912 patches): not worth a weight a pair. Where it stops being true: sources that cover less than
-// ~1/R of a hemisphere (a small bright lamp) are seen by few rays.
+// (render/form_factor_cast.c: their pattern; render/form_factor_rows.c: how they are kept;
+// render/form_factor_product.c: their product; render/form_factor_share.c: what neighbours have in common.) A row of F
+// only ever integrates a bounded function over the hemisphere, which is why a few hundred equal weights do for any
+// number of patches. The rows hold exactly (they sum to 1 with the sky); reciprocity A_k F_kj = A_j F_jk holds only
+// statistically. Never symmetrised or normalised: that raises the error. Exact factors (form_factor_exact.h) for the
+// pairs within three sizes, rays scaled to the rest of 1, change it by -8 to +5 % of itself (measured in empty rooms of
+// 768 and 6,912 patches): not worth a weight a pair. Where it stops being true: sources that cover less than ~1/R of a
+// hemisphere (a small bright lamp) are seen by few rays.
 #include "render/form_factor.h"
 #include "base/memory.h"
 #include "base/progress.h"

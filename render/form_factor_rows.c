@@ -1,37 +1,15 @@
-// Packing of hit lists, and their product with values per index:
-//     out_p = 1/R_p sum over the hits h of row p of value_h
-// The product walks block by block through all chunks, so that the values of a block (at most 1 MiB) stay in a core's
-// cache; where the hits lie in a file it walks chunk by chunk, as the file does, and asks for the next chunk ahead. A
-// row adds its blocks in the same order either way: the same bytes. Up to 256 values are summed in single precision (in
-// four lanes, so 64 additions deep: 1e-7), these sums in double.
-// Stops being fast where the hits of a row are few a block (more than ~2 million patches with 256 rays).
+// Packing of hit lists: the hits of 256 rows are sorted, cut at the blocks' ends and written block after block, in
+// memory or to a file that is mapped. Products with them: render/form_factor_product.c.
 #include "render/form_factor_rows.h"
 #include "base/memory.h"
-#include "base/vector_clones.h"
 #include <errno.h>
 #include <fcntl.h>
-#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
-
-enum { PIECE = 256 };
-
-typedef float float4 __attribute__((vector_size(16), may_alias));
-
-static size_t rows_of(const alb_hit_rows *rows, size_t chunk)
-{
-    const size_t left = rows->count - chunk * ALB_CHUNK_ROWS;
-    return left < ALB_CHUNK_ROWS ? left : ALB_CHUNK_ROWS;
-}
-
-static uint16_t (*counts_of(const alb_hit_rows *rows, size_t chunk, size_t block))[2]
-{
-    return (uint16_t(*)[2])(rows->counts + 2 * ALB_CHUNK_ROWS * (chunk * rows->blocks + block));
-}
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 static bool map_file(alb_hit_rows *rows, size_t bytes, alb_error *error)
@@ -75,7 +53,8 @@ bool alb_hit_rows_create(alb_hit_rows *rows, const uint32_t *lengths, size_t cou
     for (size_t chunk = 0; ok && chunk < rows->chunks; chunk++) {
         uint32_t *starts = rows->starts + chunk * (ALB_CHUNK_ROWS + 1);
         for (size_t r = 0; r < ALB_CHUNK_ROWS; r++)
-            starts[r + 1] = starts[r] + (r < rows_of(rows, chunk) ? lengths[chunk * ALB_CHUNK_ROWS + r] : 0);
+            starts[r + 1] =
+                starts[r] + (r < alb_hit_rows_in_chunk(rows, chunk) ? lengths[chunk * ALB_CHUNK_ROWS + r] : 0);
         rows->first[chunk + 1] = rows->first[chunk] + starts[ALB_CHUNK_ROWS];
     }
     if (ok) {
@@ -141,34 +120,32 @@ static void sort(uint32_t *to, uint32_t *from, size_t count, int passes)
     }
 }
 
-static size_t half_of(size_t length, int half) { return (length + 1 - (size_t)half) / 2; }
-
 // The row's even and odd hits, each ascending, in place; `scratch` has room for a row.
 static void sort_row(uint32_t *row, size_t length, uint32_t *scratch)
 {
-    uint32_t *const odd = scratch + half_of(length, 0);
+    uint32_t *const odd = scratch + alb_hit_rows_half(length, 0);
     for (size_t q = 0; q < length; q++)
         (q & 1 ? odd : scratch)[q / 2] = row[q];
-    sort(row, scratch, half_of(length, 0), 3);
-    sort(row + half_of(length, 0), odd, half_of(length, 1), 3);
+    sort(row, scratch, alb_hit_rows_half(length, 0), 3);
+    sort(row + alb_hit_rows_half(length, 0), odd, alb_hit_rows_half(length, 1), 3);
 }
 
 void alb_hit_rows_fill(alb_hit_rows *rows, size_t chunk, uint32_t *hits, uint32_t *scratch)
 {
-    const size_t begin = rows->first[chunk], base = chunk * ALB_CHUNK_ROWS, n = rows_of(rows, chunk);
+    const size_t begin = rows->first[chunk], base = chunk * ALB_CHUNK_ROWS, n = alb_hit_rows_in_chunk(rows, chunk);
     const uint32_t *places[ALB_CHUNK_ROWS][2], *ends[ALB_CHUNK_ROWS][2];
     for (size_t r = 0; r < n; r++) {
         uint32_t *row = hits + rows->starts[chunk * (ALB_CHUNK_ROWS + 1) + r];
         const size_t length = alb_hit_rows_length(rows, base + r);
         sort_row(row, length, scratch);
         places[r][0] = row;
-        places[r][1] = ends[r][0] = row + half_of(length, 0);
+        places[r][1] = ends[r][0] = row + alb_hit_rows_half(length, 0);
         ends[r][1] = row + length;
     }
     uint16_t *out = rows->hits + begin;
     for (size_t block = 0; block < rows->blocks; block++) {
         const uint32_t from = (uint32_t)(block * rows->block_size);
-        uint16_t(*counts)[2] = counts_of(rows, chunk, block);
+        uint16_t(*counts)[2] = alb_hit_rows_counts(rows, chunk, block);
         rows->segments[chunk * rows->blocks + block] = (size_t)(out - rows->hits);
         for (size_t r = 0; r < n; r++)
             for (int half = 0; half < 2; half++) {
@@ -212,22 +189,21 @@ void alb_hit_rows_trim(alb_hit_rows *rows)
     }
 }
 
-// Hits of the row's half that are counted alone.
-static size_t missing(const alb_hit_rows *rows, size_t row, int half)
+size_t alb_hit_rows_counted(const alb_hit_rows *rows, size_t row, int half)
 {
-    size_t left = half_of(alb_hit_rows_length(rows, row), half);
+    size_t left = alb_hit_rows_half(alb_hit_rows_length(rows, row), half);
     for (size_t block = 0; block < rows->blocks; block++)
-        left -= counts_of(rows, row / ALB_CHUNK_ROWS, block)[row % ALB_CHUNK_ROWS][half];
+        left -= alb_hit_rows_counts(rows, row / ALB_CHUNK_ROWS, block)[row % ALB_CHUNK_ROWS][half];
     return left;
 }
 
 void alb_hit_rows_read(uint32_t *hits, const alb_hit_rows *rows, size_t row)
 {
     const size_t chunk = row / ALB_CHUNK_ROWS, within = row % ALB_CHUNK_ROWS;
-    uint32_t *out[2] = {hits, hits + half_of(alb_hit_rows_length(rows, row), 0)};
-    size_t left[2] = {missing(rows, row, 0), missing(rows, row, 1)};
+    uint32_t *out[2] = {hits, hits + alb_hit_rows_half(alb_hit_rows_length(rows, row), 0)};
+    size_t left[2] = {alb_hit_rows_counted(rows, row, 0), alb_hit_rows_counted(rows, row, 1)};
     for (size_t block = 0; block < rows->blocks; block++) {
-        const uint16_t(*counts)[2] = (const uint16_t(*)[2])counts_of(rows, chunk, block);
+        const uint16_t(*counts)[2] = (const uint16_t(*)[2])alb_hit_rows_counts(rows, chunk, block);
         const uint16_t *at = rows->hits + rows->segments[chunk * rows->blocks + block];
         for (size_t r = 0; r < within; r++)
             at += (size_t)counts[r][0] + counts[r][1];
@@ -242,148 +218,4 @@ void alb_hit_rows_read(uint32_t *hits, const alb_hit_rows *rows, size_t row)
     for (int half = 0; half < 2; half++)
         for (; left[half]; left[half]--)
             *out[half]++ = rows->counted;
-}
-
-// --- products --------------------------------------------------------------------------------------------------------
-static inline void add_piece(double sum[3], const uint16_t *hits, size_t count, const float4 *values)
-{
-    float4 lanes[4] = {{0}};
-    const uint16_t *const end = hits + count, *const fours = hits + count / 4 * 4;
-    for (; hits < fours; hits += 4)
-        for (int i = 0; i < 4; i++)
-            lanes[i] += values[hits[i]];
-    for (; hits < end; hits++)
-        lanes[0] += values[*hits];
-    const float4 piece = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
-    for (int c = 0; c < 3; c++)
-        sum[c] += (double)piece[c];
-}
-
-static inline void add_hits(double sum[3], const uint16_t *hits, size_t count, const float4 *values)
-{
-    for (; count > PIECE; hits += PIECE, count -= PIECE)
-        add_piece(sum, hits, PIECE, values);
-    add_piece(sum, hits, count, values);
-}
-
-typedef struct product {
-    double (*out)[3];
-    const alb_hit_rows *rows;
-    const float4 *values;
-    bool difference;
-} product;
-
-ALB_VECTOR_CLONES static void gather(const product *p, size_t chunk, size_t block)
-{
-    const alb_hit_rows *rows = p->rows;
-    const uint16_t(*counts)[2] = (const uint16_t(*)[2])counts_of(rows, chunk, block);
-    const uint16_t *hits = rows->hits + rows->segments[chunk * rows->blocks + block];
-    const float4 *values = p->values + block * rows->block_size;
-    double(*out)[3] = p->out + chunk * ALB_CHUNK_ROWS;
-    const size_t n = rows_of(rows, chunk);
-    for (size_t r = 0; r < n; r++) {
-        const size_t count = (size_t)counts[r][0] + counts[r][1];
-        add_hits(out[r], hits, count, values);
-        hits += count;
-    }
-}
-
-static void gather_difference(const product *p, size_t chunk, size_t block)
-{
-    const alb_hit_rows *rows = p->rows;
-    const uint16_t(*counts)[2] = (const uint16_t(*)[2])counts_of(rows, chunk, block);
-    const uint16_t *hits = rows->hits + rows->segments[chunk * rows->blocks + block];
-    const size_t n = rows_of(rows, chunk), first = chunk * ALB_CHUNK_ROWS;
-    for (size_t r = 0; r < n; r++)
-        for (int half = 0; half < 2; half++) {
-            double sum[3] = {0};
-            const double weight = (half ? -1.0 : 1.0) / (double)half_of(alb_hit_rows_length(rows, first + r), half);
-            add_hits(sum, hits, counts[r][half], p->values + block * rows->block_size);
-            hits += counts[r][half];
-            for (int c = 0; c < 3; c++)
-                p->out[first + r][c] += 0.5 * weight * sum[c];
-        }
-}
-
-static void gather_part(const product *p, size_t chunk, size_t block)
-{
-    if (p->difference)
-        gather_difference(p, chunk, block);
-    else
-        gather(p, chunk, block);
-}
-
-// What comes from the index whose hits are counted: nothing, mostly.
-static void start_rows(const product *p, size_t chunk)
-{
-    const alb_hit_rows *rows = p->rows;
-    const size_t begin = chunk * ALB_CHUNK_ROWS, end = begin + rows_of(rows, chunk);
-    memset(p->out + begin, 0, (end - begin) * sizeof *p->out);
-    if (rows->counted == UINT32_MAX)
-        return;
-    const float4 value = p->values[rows->counted];
-    for (size_t r = begin; r < end && (value[0] != 0 || value[1] != 0 || value[2] != 0); r++)
-        for (int half = 0; half < 2; half++) {
-            const double length = (double)half_of(alb_hit_rows_length(rows, r), half),
-                         weight = !p->difference ? 1 : (half ? -0.5 : 0.5) / fmax(length, 1);
-            for (int c = 0; c < 3; c++)
-                p->out[r][c] += weight * (double)missing(rows, r, half) * (double)value[c];
-        }
-}
-
-static void finish_rows(const product *p, size_t chunk)
-{
-    for (size_t r = chunk * ALB_CHUNK_ROWS, end = r + rows_of(p->rows, chunk); !p->difference && r < end; r++)
-        for (int c = 0; c < 3; c++)
-            p->out[r][c] /= (double)alb_hit_rows_length(p->rows, r);
-}
-
-static void ask_ahead(const alb_hit_rows *rows, size_t chunk)
-{
-    if (chunk >= rows->chunks)
-        return;
-    const uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE), begin = (uintptr_t)(rows->hits + rows->first[chunk]);
-    const uintptr_t end = (uintptr_t)(rows->hits + rows->first[chunk + 1]), from = begin / page * page;
-    madvise((void *)from, end - from, MADV_WILLNEED);
-}
-
-static void run(const product *p)
-{
-    const size_t chunks = p->rows->chunks, blocks = p->rows->blocks;
-    if (p->rows->mapped_bytes) {
-#pragma omp parallel for schedule(static)
-        for (size_t chunk = 0; chunk < chunks; chunk++) {
-            ask_ahead(p->rows, chunk + 1);
-            start_rows(p, chunk);
-            for (size_t block = 0; block < blocks; block++)
-                gather_part(p, chunk, block);
-            finish_rows(p, chunk);
-        }
-        return;
-    }
-#pragma omp parallel
-    {
-        // the same static shares each time: a thread finishes what it began
-#pragma omp for schedule(static) nowait
-        for (size_t chunk = 0; chunk < chunks; chunk++)
-            start_rows(p, chunk);
-        for (size_t block = 0; block < blocks; block++) {
-#pragma omp for schedule(static) nowait
-            for (size_t chunk = 0; chunk < chunks; chunk++)
-                gather_part(p, chunk, block);
-        }
-#pragma omp for schedule(static) nowait
-        for (size_t chunk = 0; chunk < chunks; chunk++)
-            finish_rows(p, chunk);
-    }
-}
-
-void alb_hit_rows_gather(double (*out)[3], const alb_hit_rows *rows, const float (*values)[4])
-{
-    run(&(product){out, rows, (const float4 *)values, false});
-}
-
-void alb_hit_rows_gather_difference(double (*out)[3], const alb_hit_rows *rows, const float (*values)[4])
-{
-    run(&(product){out, rows, (const float4 *)values, true});
 }

@@ -50,3 +50,18 @@ void alb_hit_rows_read(uint32_t *hits, const alb_hit_rows *rows, size_t row);
 // over its odd ones. Four channels are gathered (16 bytes, aligned so), three come out.
 void alb_hit_rows_gather(double (*out)[3], const alb_hit_rows *rows, const float (*values)[4]);
 void alb_hit_rows_gather_difference(double (*out)[3], const alb_hit_rows *rows, const float (*values)[4]);
+
+// --- what packing and products know of the layout --------------------------------------------------------------------
+static inline size_t alb_hit_rows_in_chunk(const alb_hit_rows *rows, size_t chunk)
+{
+    const size_t left = rows->count - chunk * ALB_CHUNK_ROWS;
+    return left < ALB_CHUNK_ROWS ? left : ALB_CHUNK_ROWS;
+}
+// Of each row of the chunk, hits of its even and of its odd rays within the block.
+static inline uint16_t (*alb_hit_rows_counts(const alb_hit_rows *rows, size_t chunk, size_t block))[2]
+{
+    return (uint16_t(*)[2])(rows->counts + 2 * ALB_CHUNK_ROWS * (chunk * rows->blocks + block));
+}
+static inline size_t alb_hit_rows_half(size_t length, int half) { return (length + 1 - (size_t)half) / 2; }
+// Hits of the row's half that are counted and not kept.
+size_t alb_hit_rows_counted(const alb_hit_rows *rows, size_t row, int half);

@@ -19,6 +19,8 @@
 
 static const double unlike = 0.12;
 
+typedef float float4 __attribute__((vector_size(16), may_alias));
+
 typedef struct side {
     uint64_t edge; // lower vertex, higher vertex
     uint32_t patch, corner;
@@ -146,24 +148,24 @@ void alb_row_shares_apply(double (*values)[3], float (*room)[4], const alb_row_s
 #pragma omp for schedule(static)
         for (size_t p = 0; p < shares->count; p++) {
             const uint32_t *q = shares->neighbours[p];
-            const float scale = 1 / room[p][3];
-            double w[3];
-            for (int i = 0; i < 3; i++)
-                w[i] = 0.25 * (double)fminf(room[q[i]][3] * scale, 1);
-            for (int c = 0; c < 3; c++) {
-                const double own = values[p][c];
-                room[p][c] = (float)(own + w[0] * (values[q[0]][c] - own) + w[1] * (values[q[1]][c] - own) +
-                                     w[2] * (values[q[2]][c] - own));
+            const double *own = values[p], a = own[0], b = own[1], c = own[2], scale = 1 / (double)room[p][3];
+            double sum[3] = {0};
+            for (int i = 0; i < 3; i++) {
+                const double ratio = (double)room[q[i]][3] * scale, w = 0.25 * (ratio < 1 ? ratio : 1);
+                const double *other = values[q[i]];
+                sum[0] += w * (other[0] - a), sum[1] += w * (other[1] - b), sum[2] += w * (other[2] - c);
             }
+            room[p][0] = (float)(a + sum[0]), room[p][1] = (float)(b + sum[1]), room[p][2] = (float)(c + sum[2]);
         }
 #pragma omp for schedule(static)
         for (size_t p = 0; p < shares->count; p++) {
-            const float *own = room[p], scale = 1 / own[3];
-            float sum[3] = {0};
+            const float4 own = *(const float4 *)room[p];
+            const float scale = 1 / own[3];
+            float4 sum = {0};
             for (int i = 0; i < 3; i++) {
-                const float *other = room[shares->neighbours[p][i]], w = 0.25F * fminf(other[3] * scale, 1);
-                for (int c = 0; c < 3; c++)
-                    sum[c] += w * (other[c] - own[c]);
+                const float4 other = *(const float4 *)room[shares->neighbours[p][i]];
+                const float ratio = other[3] * scale, w = 0.25F * (ratio < 1 ? ratio : 1);
+                sum += w * (other - own);
             }
             for (int c = 0; c < 3; c++)
                 values[p][c] = (double)(own[c] + sum[c]);

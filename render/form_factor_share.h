@@ -19,6 +19,6 @@ void alb_row_shares_phases(uint8_t *phases, const alb_row_shares *shares);
 // where nothing of it is to be shared.
 void alb_row_shares_limit(alb_row_shares *shares, const alb_patches *patches, const alb_hit_rows *rows,
                           const float *nearness_per_mm);
-// values = W W values; room[patch][3] holds the patch's area, in any unit, and stays; the rest of it is scratch.
-// Constants stay, and so does the sum of area times value.
+// values = W W values; room (aligned to 16 bytes)[patch][3] holds the patch's area, in any unit, and stays; the rest of
+// it is scratch. Constants stay, and so does the sum of area times value.
 void alb_row_shares_apply(double (*values)[3], float (*room)[4], const alb_row_shares *shares);
