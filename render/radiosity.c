@@ -157,7 +157,7 @@ bool alb_radiosity_check(double *largest, const alb_scatter *scatter, bool close
         if (!(closed_scene ? sum < 1 - rounding : sum <= 1 + rounding))
             ok = alb_fail(
                 error, ALB_BAD_DATA,
-                "material '%s' creates light: patch %zu, channel %s sends out %.4f of what falls on it evenly (%s); "
+                "material '%s' creates light: patch %zu, channel %s sends out %.7g of what falls on it evenly (%s); "
                 "the profile is too bright, or the body too thin for it",
                 surfaces[materials[patch]].name, patch, channels[channel], sum,
                 closed_scene ? "a closed scene needs less than 1" : "at most 1");

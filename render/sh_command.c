@@ -194,7 +194,7 @@ static bool run(int argc, char **argv, alb_error *error)
                                   {"--format", NULL, false, &format, NULL}};
     alb_sh_law law = {.alpha_deg = 45, .order_out = 4};
     double ratios[RATIOS_MAX];
-    int count, kind, map_kind, shape;
+    int count = 0, kind, map_kind, shape;
     if (!alb_options_read(options, sizeof options / sizeof options[0], argc, argv, error) ||
         !find_name(&map_kind, "--map", map, alb_sh_map_names, ALB_SH_MAP_CUSTOM, error) ||
         !find_name(&shape, "--format", format ? format : "csv", formats, 3, error))

@@ -19,7 +19,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { WAYS = 10, RAYS = 4, CHECKED = 3, SHADE = 160 };
+enum { WAYS = 11, PICTURED = 8, RAYS = 4, CHECKED = 3, SHADE = 160 };
 
 static const struct {
     const char *name;
@@ -34,6 +34,7 @@ static const struct {
                 {"4 shells", FIELDS, 4, 1, 2, 8, 64, 0.04},
                 {"4 shells, order 8", FIELDS, 8, 1, 2, 12, 64, 0.02},
                 {"probes", PROBES, 4, 1, 0, 8, 64, 0.04},
+                {"4 shells, probes", PROBES, 4, 1, 2, 8, 64, 0.04},
                 {"transport", TRANSPORT, 4, 1, 0, 8, 64, 0.04},
                 {"16 shells", FULL, 4, 1, 0, 8, 64, 0.04}};
 #define BOTTOM 0.3                              // percent, of the chart
@@ -205,18 +206,23 @@ static double ray_time(const double *ms, const double *percent, double wanted)
     return ms[k] * pow(ms[k + 1] / ms[k], log(wanted / percent[k]) / log(percent[k + 1] / percent[k]));
 }
 
-// Above the line of the rays they are as good in less time: hatched, up and down.
+// The error that rays make in a time, likewise.
+static double ray_error(const double *ms, const double *percent, double time)
+{
+    int k = 0;
+    while (k + 2 < RAYS && ms[k + 1] < time)
+        k++;
+    return percent[k] * pow(percent[k + 1] / percent[k], log(time / ms[k]) / log(ms[k + 1] / ms[k]));
+}
+
+// Above the line of the rays they are as good in less time: hatched, up and down, evenly along the chart.
 static void shade(double *x, double *y, const double *ms, const double *percent, double top)
 {
-    const double low = fmax(percent[RAYS - 1] / 4, BOTTOM);
+    const double last = ray_time(ms, percent, fmax(percent[RAYS - 1] / 4, BOTTOM));
     for (int n = 0; n < SHADE; n++) {
-        y[2 * n] = percent[0] * pow(low / percent[0], (double)n / (SHADE - 1));
-        x[2 * n] = x[2 * n + 1] = ray_time(ms, percent, y[2 * n]);
-        y[2 * n + 1] = top;
-        if (n % 2) {
-            const double swap = y[2 * n];
-            y[2 * n] = y[2 * n + 1], y[2 * n + 1] = swap;
-        }
+        x[2 * n] = x[2 * n + 1] = ms[0] * pow(last / ms[0], (double)n / (SHADE - 1));
+        y[2 * n + n % 2] = ray_error(ms, percent, x[2 * n]);
+        y[2 * n + 1 - n % 2] = top;
     }
 }
 
@@ -227,8 +233,8 @@ typedef struct figures {
 
 static bool chart(const char *path, const figures *f, alb_error *error)
 {
-    static const char *const colours[WAYS] = {"#d62728", "#1f77b4", "#17becf", "#9467bd", "#2ca02c",
-                                              "#8c564b", "#e377c2", "#bcbd22", "#000",    "#ff7f0e"};
+    static const char *const colours[WAYS] = {"#d62728", "#1f77b4", "#17becf", "#9467bd", "#2ca02c", "#8c564b",
+                                              "#e377c2", "#bcbd22", "#98df8a", "#000",    "#ff7f0e"};
     static double shade_x[SHADOW_SCENES][2 * SHADE], shade_y[SHADOW_SCENES][2 * SHADE], twice[SHADOW_SCENES][WAYS][2];
     alb_curve curves[SHADOW_SCENES][WAYS + 3];
     alb_panel panels[SHADOW_SCENES];
@@ -286,7 +292,7 @@ static void compare(const figures *f)
             }
 }
 
-// A frame of each scene at half its size, two by two; the settings with 4 shells.
+// A frame of each scene at half its size, two by two; 4 shells and probes.
 static bool draw_frames(const char *chart_path, alb_error *error)
 {
     char path[1024];
@@ -295,7 +301,7 @@ static bool draw_frames(const char *chart_path, alb_error *error)
     for (int i = 0; ok && i < SHADOW_SCENES; i++) {
         alb_scene scene;
         alb_image picture = {0};
-        alb_shadow_stage stage = stage_of(WAYS - 1); // with transport where a scene has rigid objects
+        alb_shadow_stage stage = stage_of(PICTURED); // with transport where a scene has rigid objects
         double brightest, exposure;
         if (!shadow_scenes[i].create(&scene, 12, error))
             break;
