@@ -291,17 +291,24 @@ static bool check_surfaces(const alb_scatter *scatter, const alb_surface *surfac
                              "rewritten for that; prepare the scene anew");
 }
 
+static const uint32_t rules_ahead = 32;
+
 static void write_local(alb_scatter *scatter, const alb_surface *surfaces)
 {
     const alb_scatter_parts *p = scatter->parts;
+#pragma omp parallel for schedule(static)
     for (size_t i = 0; i < scatter->patch_count; i++)
-        memcpy(scatter->local[i], surfaces[p->materials[i]].reflectance, sizeof scatter->local[i]);
+        if (!surfaces[p->materials[i]].scatters)
+            memcpy(scatter->local[i], surfaces[p->materials[i]].reflectance, sizeof scatter->local[i]);
     for (size_t t = 0; t < p->forest.tree_count; t++) {
         const alb_tree *tree = &p->forest.trees[t];
         const alb_scatter_kernel *kernel = &p->kernels[p->of_bodies[tree->body].index[ALB_REFLECTION]];
 #pragma omp parallel for schedule(static)
-        for (uint32_t leaf = tree->first_leaf; leaf < tree->first_leaf + tree->leaf_count; leaf++)
+        for (uint32_t leaf = tree->first_leaf; leaf < tree->first_leaf + tree->leaf_count; leaf++) {
+            if (leaf + rules_ahead < p->forest.leaf_count) // memory is slower than the rule
+                __builtin_prefetch(&p->self[leaf + rules_ahead]);
             alb_rule_apply(scatter->local[p->forest.patches[leaf]], &p->self[leaf], kernel);
+        }
     }
 }
 
@@ -353,18 +360,19 @@ static double ratio_of(const alb_scatter_parts *p, const alb_tree *tree, const a
 static bool estimate_rows(alb_scatter *scatter, const alb_surface *surfaces)
 {
     const alb_scatter_parts *p = scatter->parts;
+#pragma omp parallel for schedule(static)
     for (size_t i = 0; i < scatter->patch_count; i++)
         if (!surfaces[p->materials[i]].scatters)
             memcpy(scatter->row_sums[i], scatter->local[i], sizeof *scatter->local);
-    for (size_t t = 0; t < p->forest.tree_count; t++) {
-        const alb_tree *tree = &p->forest.trees[t];
-        for (int c = 0; c < 3; c++) {
-            const double ratio = ratio_of(p, tree, surfaces, c);
-            if (!isfinite(ratio))
+    for (const alb_tree *tree = p->forest.trees; tree < p->forest.trees + p->forest.tree_count; tree++) {
+        double ratios[3];
+        for (int c = 0; c < 3; c++)
+            if (!isfinite(ratios[c] = ratio_of(p, tree, surfaces, c)))
                 return false;
-            for (uint32_t leaf = tree->first_leaf; leaf < tree->first_leaf + tree->leaf_count; leaf++)
-                scatter->row_sums[p->forest.patches[leaf]][c] *= ratio;
-        }
+#pragma omp parallel for schedule(static) if (tree->leaf_count > 4096)
+        for (uint32_t leaf = tree->first_leaf; leaf < tree->first_leaf + tree->leaf_count; leaf++)
+            for (int c = 0; c < 3; c++)
+                scatter->row_sums[p->forest.patches[leaf]][c] *= ratios[c];
     }
     return true;
 }

@@ -12,7 +12,7 @@
 #include "base/vector_clones.h"
 #include <string.h>
 
-enum { PER_EDGE = (ALB_RULE_NODES - 1) / 3, WHOLE_CODE = UINT16_MAX, WHOLE_TURN = INT16_MAX };
+enum { PER_EDGE = (ALB_RULE_NODES - 1) / 3, WHOLE_CODE = UINT16_MAX + 1, WHOLE_TURN = INT16_MAX };
 
 static const double nodes[PER_EDGE] = {-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
                                        0.9061798459386640};
@@ -39,6 +39,11 @@ static void take_edge(double distances[PER_EDGE], double angles[PER_EDGE], alb_v
         angles[k] *= fabs(signed_d) > 1e-9 * (to - from) ? angle / sum : 0; // seen edge-on: no angle
 }
 
+static uint16_t code_of(double distance_mm, double near_mm)
+{
+    return (uint16_t)fmin(rint(sqrt(distance_mm / near_mm) * WHOLE_CODE), UINT16_MAX);
+}
+
 void alb_rule_find(alb_rule *rule, const alb_vector triangle[3], alb_vector p, double near_mm)
 {
     double distances[ALB_RULE_NODES - 1], angles[ALB_RULE_NODES - 1], below = 0;
@@ -51,29 +56,32 @@ void alb_rule_find(alb_rule *rule, const alb_vector triangle[3], alb_vector p, d
     for (int k = 0; k < ALB_RULE_NODES - 1; k++) { // rounded so that they add up to the whole
         const double next = below + angles[k] / (2 * M_PI), distance = hypot(distances[k], height);
         rule->weights[k] = (int16_t)(lrint(next * WHOLE_TURN) - lrint(below * WHOLE_TURN));
-        rule->codes[k] = (uint16_t)lrint(fmin(sqrt(distance / near_mm), 1) * WHOLE_CODE);
+        rule->codes[k] = code_of(distance, near_mm);
         below = next;
     }
     rule->weights[ALB_RULE_NODES - 1] = (int16_t)-lrint(below * WHOLE_TURN);
-    rule->codes[ALB_RULE_NODES - 1] = (uint16_t)lrint(fmin(sqrt(fabs(height) / near_mm), 1) * WHOLE_CODE);
+    rule->codes[ALB_RULE_NODES - 1] = code_of(fabs(height), near_mm);
 }
 
 ALB_VECTOR_CLONES
 void alb_rule_apply(double integral[3], const alb_rule *rule, const alb_scatter_kernel *kernel)
 {
     typedef float float4 __attribute__((vector_size(16)));
-    typedef double double4 __attribute__((vector_size(32)));
-    const double whole = 2 * M_PI / WHOLE_TURN * kernel->near_mm;
-    double4 sum = {0};
+    enum { PER_KNOT = WHOLE_CODE / ALB_DISC_KNOTS };
+    float below[ALB_RULE_NODES], above[ALB_RULE_NODES]; // shares of the knots on either side
+    float4 sum = {0};
     for (int k = 0; k < ALB_RULE_NODES; k++) {
-        const double u = (double)rule->codes[k] * (1.0 / WHOLE_CODE), at = u * ALB_DISC_KNOTS;
-        const int knot = at < ALB_DISC_KNOTS ? (int)at : ALB_DISC_KNOTS - 1;
-        float4 knots[2];
-        memcpy(knots, kernel->discs[knot], sizeof knots);
-        const double4 low = __builtin_convertvector(knots[0], double4),
-                      high = __builtin_convertvector(knots[1], double4);
-        sum += whole * (double)rule->weights[k] * u * u * (low + (at - knot) * (high - low));
+        const float u = (float)rule->codes[k] * (1.0F / WHOLE_CODE), all = (float)rule->weights[k] * u * u;
+        above[k] = all * (float)(rule->codes[k] % PER_KNOT) * (1.0F / PER_KNOT);
+        below[k] = all - above[k];
     }
+#pragma GCC unroll 16
+    for (int k = 0; k < ALB_RULE_NODES; k++) {
+        float4 knots[2];
+        memcpy(knots, kernel->discs[rule->codes[k] / PER_KNOT], sizeof knots);
+        sum += below[k] * knots[0] + above[k] * knots[1];
+    }
+    const double whole = 2 * M_PI / WHOLE_TURN * kernel->near_mm;
     for (int c = 0; c < 3; c++)
-        integral[c] = fmax(0, sum[c]); // quadrature noise where the profile has died away
+        integral[c] = fmax(0, whole * (double)sum[c]); // quadrature noise where the profile has died away
 }

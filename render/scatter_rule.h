@@ -5,7 +5,7 @@
 
 enum { ALB_RULE_NODES = 16 };
 
-// integral s(|x - p|) dA = 2 pi sum weight / 32767 P(distance), distance = (code / 65535)^2 near_mm of the kernel.
+// integral s(|x - p|) dA = 2 pi sum weight / 32767 P(distance), distance = (code / 65536)^2 near_mm of the kernel.
 typedef struct alb_rule {
     uint16_t codes[ALB_RULE_NODES];
     int16_t weights[ALB_RULE_NODES];
