@@ -251,8 +251,6 @@ static void add_pairs(double sums[ALB_BLOCK][3], double evens[ALB_BLOCK][3], con
         }
 }
 
-enum { PAIRS_AHEAD = 6 }; // memory is slower than a rule
-
 void alb_product_write_pairs(const alb_links *links, const alb_scatter_kernel *kernels)
 {
 #pragma omp parallel for schedule(dynamic, 16)
@@ -260,8 +258,6 @@ void alb_product_write_pairs(const alb_links *links, const alb_scatter_kernel *k
         for (uint32_t k = 0; k < links->blocks[b].pair_count; k++) {
             alb_exact_pair *pair = &links->blocks[b].pairs[k];
             double integral[3];
-            if (k + PAIRS_AHEAD < links->blocks[b].pair_count)
-                __builtin_prefetch(&pair[PAIRS_AHEAD].rule);
             alb_rule_apply(integral, &pair->rule, &kernels[pair->kernel]);
             for (int c = 0; c < 3; c++)
                 pair->weights[c] = (float)integral[c] * pair->per_area;
