@@ -11,7 +11,7 @@ typedef struct alb_receivers {
     alb_rgb *gathered;         // scratch of a product: mean over the hits of each receiver
 } alb_receivers;
 
-enum { ALB_RECEIVER_PATCHES = 4, ALB_RECEIVER_RAYS = 256 };
+enum { ALB_RECEIVER_PATCHES = 4, ALB_RECEIVER_RAYS = 192 };
 
 // Quarters of the equations' clusters or so, those taken apart in whose patches light differs: given irradiances
 // bounced[0 .. light_count) that patches send each other, and the length |B| of the solutions that they belong to,

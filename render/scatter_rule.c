@@ -82,6 +82,6 @@ void alb_rule_apply(double integral[3], const alb_rule *rule, const alb_scatter_
         sum += below[k] * knots[0] + above[k] * knots[1];
     }
     const double whole = 2 * M_PI / WHOLE_TURN * kernel->near_mm;
-    for (int c = 0; c < 3; c++)
-        integral[c] = fmax(0, whole * (double)sum[c]); // quadrature noise where the profile has died away
+    for (int c = 0; c < 3; c++) // quadrature noise where the profile has died away; what is no number stays that
+        integral[c] = sum[c] < 0 ? 0 : whole * (double)sum[c];
 }

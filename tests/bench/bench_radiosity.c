@@ -16,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { RUNS = 3, FRAMES = 3, RANK = 32, BOWLS = 1 };
+enum { RUNS = 3, FRAMES = 3, RANK = 48, BOWLS = 1 };
 
 static void move_lights(alb_scene *scene, int step)
 {
@@ -128,7 +128,7 @@ static bool relight_narrowly(bench *b, alb_solution *s, alb_error *error)
     double seconds[RUNS];
     rgb *radiosity = alb_allocate(s->patches.count, sizeof *radiosity, error);
     const double start_s = alb_clock_s(), links_mb = (double)alb_scatter_bytes(&s->scatter) / 1e6;
-    const bool ok = radiosity && alb_scatter_keep_weights(&s->scatter, 0.005, NULL, error) &&
+    const bool ok = radiosity && alb_scatter_keep_weights(&s->scatter, 0.006, NULL, error) &&
                     alb_relight_create(&narrow, &s->equations, &s->patches, RANK, 3, error);
     if (ok) {
         b->narrow_made_s = alb_clock_s() - start_s;
