@@ -280,23 +280,24 @@ static void take_values(const alb_clusters *clusters, const alb_rgb *from)
 typedef float float4 __attribute__((vector_size(16), may_alias));
 
 ALB_VECTOR_CLONES
-void alb_clusters_gather(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity)
+void alb_clusters_gather(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity, int stride)
 {
     const float4 *values = (const float4 *)clusters->values;
+    const double weight = (double)stride / ALB_CLUSTER_RAYS;
     take_values(clusters, radiosity);
 #pragma omp parallel for schedule(static) if (clusters->count > 256)
     for (size_t k = 0; k < clusters->count; k++) {
         const uint16_t *hits = clusters->hits + clusters->first_hit[k], *const end =
                                                                             clusters->hits + clusters->first_hit[k + 1];
         float4 lanes[4] = {{0}};
-        for (; end - hits >= 4; hits += 4)
+        for (; end - hits > 3 * stride; hits += 4 * stride)
             for (int i = 0; i < 4; i++)
-                lanes[i] += values[hits[i]];
-        for (; hits < end; hits++)
+                lanes[i] += values[hits[i * stride]];
+        for (; hits < end; hits += stride)
             lanes[0] += values[*hits];
         const float4 sum = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
         for (int c = 0; c < 3; c++)
-            out[k][c] = (double)sum[c] / ALB_CLUSTER_RAYS;
+            out[k][c] = weight * (double)sum[c];
     }
 }
 
@@ -333,7 +334,7 @@ static void bounce(alb_rgb *out, const void *data, const alb_rgb *x)
 {
     const alb_clusters *clusters = data;
     alb_clusters_scatter(clusters->bounced, clusters, x);
-    alb_clusters_gather(out, clusters, (const alb_rgb *)clusters->bounced);
+    alb_clusters_gather(out, clusters, (const alb_rgb *)clusters->bounced, 1);
 }
 
 void alb_clusters_settle(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity)
@@ -341,7 +342,7 @@ void alb_clusters_settle(alb_rgb *out, const alb_clusters *clusters, const alb_r
     alb_radiosity_report report;
     const alb_bounce coarse = {
         .count = clusters->count, .areas_mm2 = clusters->areas_mm2, .data = clusters, .apply = bounce};
-    alb_clusters_gather(clusters->right, clusters, radiosity);
+    alb_clusters_gather(clusters->right, clusters, radiosity, 1);
     if (!alb_solver_run(out, &report, ALB_SOLVER_GMRES, &coarse, (const alb_rgb *)clusters->right, NULL,
                         coarse_residual, NULL))
         memset(out, 0, clusters->count * sizeof *out); // no memory: as without this level

@@ -34,7 +34,7 @@ size_t alb_clusters_bytes(const alb_clusters *clusters);
 void alb_clusters_average(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *values);
 // out = S_c light: what clusters send out of irradiance even on each.
 void alb_clusters_scatter(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *light);
-// out = F_c radiosity: irradiance of the clusters by each other.
-void alb_clusters_gather(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity);
+// out = F_c radiosity: irradiance of the clusters by each other, by one in `stride` of their rays.
+void alb_clusters_gather(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity, int stride);
 // out = (I - F_c S_c)^-1 F_c radiosity: irradiance of the clusters by each other, for what they send out by themselves.
 void alb_clusters_settle(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity);

@@ -78,7 +78,7 @@ static void bounce_coarsely(const alb_relight *r)
     float factors[3 * ALB_RELIGHT_RANK_MAX];
     project(factors, r);
     alb_clusters_scatter(r->sent, clusters, (const alb_rgb *)r->even);
-    alb_clusters_gather(r->bounced, clusters, (const alb_rgb *)r->sent);
+    alb_clusters_gather(r->bounced, clusters, (const alb_rgb *)r->sent, 2);
 #pragma omp parallel for schedule(static)
     for (size_t k = 0; k < clusters->count; k++) {
         double later[3];
@@ -93,6 +93,7 @@ static void send_roughly(const alb_relight *r, const alb_rgb *irradiance)
 {
     const alb_clusters *clusters = &r->equations->clusters;
     alb_clusters_scatter(r->sent, clusters, (const alb_rgb *)r->bounced);
+#pragma omp parallel for schedule(static)
     for (size_t k = 0; k < clusters->count; k++) // as even light that sends it, less what is there
         for (int c = 0; c < 3; c++)
             r->sent[k][c] = (clusters->kept[k][c] > 0 ? r->sent[k][c] / clusters->kept[k][c] : 0) - r->even[k][c];

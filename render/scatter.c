@@ -43,6 +43,8 @@ struct alb_scatter_parts {
     alb_bodies found;         // while links are made
     alb_optical_paths *paths; // likewise: of each body
     const uint16_t *materials;
+    uint32_t *opaque; // patches that are in no tree
+    size_t opaque_count;
     double (*totals)[3]; // of each kernel's profiles, as they are
     bool rows_known;     // the row sums are no estimate
     alb_weights weights; // empty: products look the profiles up
@@ -212,10 +214,15 @@ static bool find_bodies(alb_scatter *scatter, const alb_patches *patches, const 
     const size_t n = patches->count;
     const uint16_t *materials = scatter->parts->materials;
     alb_bodies *found = &scatter->parts->found;
+    alb_scatter_parts *p = scatter->parts;
     int *labels = alb_allocate(n, sizeof *labels, error);
-    for (size_t i = 0; labels && i < n; i++)
+    p->opaque = labels ? alb_allocate(n, sizeof *p->opaque, error) : NULL;
+    for (size_t i = 0; p->opaque && i < n; i++) {
         labels[i] = surfaces[materials[i]].scatters ? materials[i] : -1;
-    bool ok = labels && alb_bodies_find(found, patches, labels, error) &&
+        if (labels[i] < 0)
+            p->opaque[p->opaque_count++] = (uint32_t)i;
+    }
+    bool ok = p->opaque && alb_bodies_find(found, patches, labels, error) &&
               (scatter->bodies = alb_allocate(found->count, sizeof *scatter->bodies, error));
     for (size_t b = 0; ok && b < found->count; b++)
         scatter->bodies[scatter->body_count++] = (alb_scatter_body){.patch_count = found->bodies[b].count,
@@ -259,6 +266,7 @@ void alb_scatter_free(alb_scatter *scatter)
             alb_scatter_kernel_free(&p->kernels[k]);
         free(p->kernels);
         free(p->totals);
+        free(p->opaque);
         free(p->of_bodies);
         free(p->self);
         free_paths(p);
@@ -296,10 +304,8 @@ static const uint32_t rules_ahead = 32;
 static void write_local(alb_scatter *scatter, const alb_surface *surfaces)
 {
     const alb_scatter_parts *p = scatter->parts;
-#pragma omp parallel for schedule(static)
-    for (size_t i = 0; i < scatter->patch_count; i++)
-        if (!surfaces[p->materials[i]].scatters)
-            memcpy(scatter->local[i], surfaces[p->materials[i]].reflectance, sizeof scatter->local[i]);
+    for (size_t k = 0; k < p->opaque_count; k++)
+        memcpy(scatter->local[p->opaque[k]], surfaces[p->materials[p->opaque[k]]].reflectance, sizeof *scatter->local);
     for (size_t t = 0; t < p->forest.tree_count; t++) {
         const alb_tree *tree = &p->forest.trees[t];
         const alb_scatter_kernel *kernel = &p->kernels[p->of_bodies[tree->body].index[ALB_REFLECTION]];
@@ -360,10 +366,8 @@ static double ratio_of(const alb_scatter_parts *p, const alb_tree *tree, const a
 static bool estimate_rows(alb_scatter *scatter, const alb_surface *surfaces)
 {
     const alb_scatter_parts *p = scatter->parts;
-#pragma omp parallel for schedule(static)
-    for (size_t i = 0; i < scatter->patch_count; i++)
-        if (!surfaces[p->materials[i]].scatters)
-            memcpy(scatter->row_sums[i], scatter->local[i], sizeof *scatter->local);
+    for (size_t k = 0; k < p->opaque_count; k++)
+        memcpy(scatter->row_sums[p->opaque[k]], scatter->local[p->opaque[k]], sizeof *scatter->local);
     for (const alb_tree *tree = p->forest.trees; tree < p->forest.trees + p->forest.tree_count; tree++) {
         double ratios[3];
         for (int c = 0; c < 3; c++)
@@ -409,6 +413,13 @@ void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const doubl
 {
     alb_scatter_parts *p = scatter->parts;
     double(*even)[3] = p->rows_known ? NULL : scatter->row_sums;
+    if (p->weights.blocks && !p->by_links) {
+        for (size_t k = 0; k < p->opaque_count; k++)
+            for (int c = 0; c < 3; c++)
+                out[p->opaque[k]][c] = scatter->local[p->opaque[k]][c] * irradiance[p->opaque[k]][c];
+        alb_weights_apply(out, &p->weights, &p->forest, (const double(*)[3])scatter->local, irradiance);
+        return;
+    }
 #pragma omp parallel for schedule(static)
     for (size_t j = 0; j < scatter->patch_count; j++)
         for (int c = 0; c < 3; c++) {
@@ -416,10 +427,6 @@ void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const doubl
             if (even)
                 even[j][c] = scatter->local[j][c];
         }
-    if (p->weights.blocks && !p->by_links) {
-        alb_weights_add(out, &p->weights, &p->forest, irradiance);
-        return;
-    }
     alb_forest_gather(&p->forest, irradiance);
     alb_product_add(out, even, &p->links, &p->forest, p->kernels, both_sides);
     p->rows_known = true;
@@ -489,7 +496,7 @@ size_t alb_scatter_bytes(const alb_scatter *scatter)
     if (!p)
         return bytes;
     bytes += alb_weights_bytes(&p->weights, &p->forest) + alb_forest_bytes(&p->forest) +
-             p->forest.leaf_count * sizeof *p->self;
+             p->forest.leaf_count * sizeof *p->self + p->opaque_count * sizeof *p->opaque;
     for (size_t k = 0; k < p->kernel_count; k++)
         bytes += alb_scatter_kernel_bytes(&p->kernels[k]);
     for (size_t b = 0; b < p->links.block_count; b++)

@@ -69,8 +69,8 @@ static void gather(const alb_weights *weights, const double (*irradiance)[3])
         gather_one(weights, irradiance, weights->tops[top]);
 }
 
-void alb_weights_add(double (*out)[3], const alb_weights *weights, const alb_forest *forest,
-                     const double (*irradiance)[3])
+void alb_weights_apply(double (*out)[3], const alb_weights *weights, const alb_forest *forest, const double (*local)[3],
+                       const double (*irradiance)[3])
 {
     gather(weights, irradiance);
 #pragma omp parallel for schedule(dynamic, 32)
@@ -78,9 +78,11 @@ void alb_weights_add(double (*out)[3], const alb_weights *weights, const alb_for
         const alb_weight_block *block = &weights->blocks[b];
         float sums[3][ALB_BLOCK];
         add_sources(sums, block, (const float(*)[4])weights->lights);
-        for (uint32_t row = 0; row < block->row_count; row++)
+        for (uint32_t row = 0; row < block->row_count; row++) {
+            const uint32_t p = forest->patches[block->first_leaf + row];
             for (int c = 0; c < 3; c++)
-                out[forest->patches[block->first_leaf + row]][c] += (double)(block->scales[c][row] * sums[c][row]);
+                out[p][c] = local[p][c] * irradiance[p][c] + (double)(block->scales[c][row] * sums[c][row]);
+        }
     }
 }
 

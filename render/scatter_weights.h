@@ -7,7 +7,7 @@
 // stand beside each other in 16 bits, and two sources share a word.
 enum { ALB_WEIGHT_GROUP = 4, ALB_WEIGHT_BITS = 5, ALB_WEIGHT_SHIFT = 21 };
 enum { ALB_WEIGHT_PART = 2048 };       // leaves of a subtree, at most
-enum { ALB_WEIGHT_GROUPS_AHEAD = 24 }; // what a product asks memory for before it is there
+enum { ALB_WEIGHT_GROUPS_AHEAD = 64 }; // what a product asks memory for before it is there
 
 // What lights a block of exit patches: clusters of the forest, source k the one first_source + gaps[0] + ... + gaps[k].
 // Where a gap is too wide, sources of no weight stand between; the last group is filled up with them.
@@ -44,9 +44,10 @@ bool alb_weights_create(alb_weights *weights, const alb_links *links, const alb_
                         double error_wanted, alb_error *error);
 void alb_weights_free(alb_weights *weights);
 size_t alb_weights_bytes(const alb_weights *weights, const alb_forest *forest);
-// Adds to the rows of out what the irradiance sends from other patches. The same bytes with any number of threads.
-void alb_weights_add(double (*out)[3], const alb_weights *weights, const alb_forest *forest,
-                     const double (*irradiance)[3]);
+// What irradiance sends out of the patches of the forest: local of its own, and what other patches send. Rows of out of
+// patches that are in no tree stay. The same bytes with any number of threads.
+void alb_weights_apply(double (*out)[3], const alb_weights *weights, const alb_forest *forest, const double (*local)[3],
+                       const double (*irradiance)[3]);
 // The largest error of products with the weights against those with the links, over lights around random patches.
 bool alb_weights_error(double *percent, const alb_weights *weights, const alb_links *links, alb_forest *forest,
                        const alb_scatter_kernel *kernels, const double (*local)[3], size_t patch_count,

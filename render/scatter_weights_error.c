@@ -79,7 +79,7 @@ bool alb_weights_error(double *percent, const alb_weights *weights, const alb_li
         memset(found, 0, patch_count * sizeof *found);
         light_around(light, found, forest, local, k);
         memcpy(wanted, found, patch_count * sizeof *found);
-        alb_weights_add(found, weights, forest, (const double(*)[3])light);
+        alb_weights_apply(found, weights, forest, local, (const double(*)[3])light);
         alb_forest_gather(forest, (const double(*)[3])light);
         alb_product_add(wanted, NULL, links, forest, kernels, 1U << ALB_REFLECTION | 1U << ALB_TRANSMISSION);
         *percent = fmax(*percent, 100 * difference(forest, (const double(*)[3])found, (const double(*)[3])wanted));
