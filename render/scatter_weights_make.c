@@ -66,7 +66,9 @@ static void write_codes(alb_weight_block *block, const alb_weight_sources *from,
     double largest = 0, sum = 0, left = 0;
     for (size_t k = 0; k < from->count; k++)
         largest = fmax(largest, (double)from->items[k].weights[channel][row]);
-    for (size_t k = 0; k < from->count && largest > 0; k++) {
+    for (size_t k = 0; k < from->count; k++) {
+        if (!(from->items[k].weights[channel][row] > 0)) // what fills a gap gets nothing of others' rounding
+            continue;
         left += (double)from->items[k].weights[channel][row] / largest * largest_code;
         const uint32_t code = code_of(left);
         block->codes[k / ALB_WEIGHT_GROUP][k % ALB_WEIGHT_GROUP / 2][row] |=

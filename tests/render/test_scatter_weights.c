@@ -216,6 +216,36 @@ static void a_rewrite_drops_weights(void **state)
     world_free(&w);
 }
 
+// A body so large, for its profile, that sources lie further apart than 16 bits.
+static void wide_gaps_are_bridged(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    alb_scene scene = {0};
+    alb_patches patches;
+    alb_scatter scatter;
+    alb_mesh mesh = {0};
+    const alb_sphere sphere = {.radius_mm = 50, .subdivisions = 6};
+    double percent;
+    begin(&scene, 1, 16, 1e-3);
+    check_ok(alb_shape_sphere(&mesh, &sphere, &error), &error);
+    assert_true(mesh.face_count > UINT16_MAX);
+    add_mesh(&scene, &mesh, 0);
+    scene.surfaces[0].scatters = true;
+    for (int c = 0; c < 3; c++) {
+        const double rate_per_mm = 4.0 / (1 + c);
+        scene.surfaces[0].profiles[0][c] =
+            (alb_profile){ALB_FORM_EXPONENTIAL, {0.8 * rate_per_mm * rate_per_mm / (2 * M_PI), rate_per_mm}};
+    }
+    check_ok(alb_patches_create(&patches, &scene.mesh, &error), &error);
+    check_ok(alb_scatter_create(&scatter, &patches, scene.mesh.groups, scene.surfaces, 0.005, &error), &error);
+    check_ok(alb_scatter_keep_weights(&scatter, 0.005, &percent, &error), &error);
+    check_below(percent, 1); // of light with sharp edges: as in small bodies
+    alb_scatter_free(&scatter);
+    alb_patches_free(&patches);
+    alb_scene_free(&scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -223,6 +253,7 @@ int main(void)
         cmocka_unit_test(row_sums_stay),
         cmocka_unit_test(same_bytes_with_any_number_of_threads),
         cmocka_unit_test(a_rewrite_drops_weights),
+        cmocka_unit_test(wide_gaps_are_bridged),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
