@@ -11,6 +11,7 @@
 #include <string.h>
 
 typedef float float4 __attribute__((vector_size(16)));
+typedef double double4 __attribute__((vector_size(32)));
 typedef int8_t byte4 __attribute__((vector_size(4)));
 
 static inline float4 load(const float values[4])
@@ -48,11 +49,10 @@ static inline __attribute__((always_inline)) void add_near_rows(float4 rows[ALB_
         rows[row] += load(run->values[codes[row]]) * (light + load(run->bends[codes[row]] + 4) * spread);
 }
 
-static inline __attribute__((always_inline)) void end_run(double sums[ALB_BLOCK][3], const float4 rows[ALB_BLOCK])
+static inline __attribute__((always_inline)) void end_run(double4 sums[ALB_BLOCK], const float4 rows[ALB_BLOCK])
 {
     for (int row = 0; row < ALB_BLOCK; row++)
-        for (int c = 0; c < 3; c++)
-            sums[row][c] += (double)rows[row][c];
+        sums[row] += __builtin_convertvector(rows[row], double4);
 }
 
 // What the extent of a node adds to its light: v s''/2s, and the fourth order of an exponential, (s''/s)^2 m_4 / 24
@@ -76,7 +76,7 @@ static inline __attribute__((always_inline)) float4 by_moments(const alb_scatter
 }
 
 // Nodes: light and its moments.
-static inline __attribute__((always_inline)) void add_nodes(double sums[ALB_BLOCK][3], const stretch *run, bool near)
+static inline __attribute__((always_inline)) void add_nodes(double4 sums[ALB_BLOCK], const stretch *run, bool near)
 {
     float4 rows[ALB_BLOCK] = {{0}};
     const alb_scatter_node *node = run->forest->nodes + run->first;
@@ -95,7 +95,7 @@ static inline __attribute__((always_inline)) void add_nodes(double sums[ALB_BLOC
 }
 
 // Patches, taken at one distance.
-static inline __attribute__((always_inline)) void add_patches(double sums[ALB_BLOCK][3], const stretch *run, bool near)
+static inline __attribute__((always_inline)) void add_patches(double4 sums[ALB_BLOCK], const stretch *run, bool near)
 {
     float4 rows[ALB_BLOCK] = {{0}};
     const float(*light)[4] = (const float(*)[4])run->forest->lights + run->first;
@@ -114,7 +114,7 @@ static inline __attribute__((always_inline)) void add_patches(double sums[ALB_BL
 }
 
 // Patches whose light is shared out.
-static inline __attribute__((always_inline)) void add_shares(double sums[ALB_BLOCK][3], const stretch *run, int kind)
+static inline __attribute__((always_inline)) void add_shares(double4 sums[ALB_BLOCK], const stretch *run, int kind)
 {
     float4 rows[ALB_BLOCK] = {{0}};
     const float(*light)[4] = (const float(*)[4])run->forest->lights + run->first;
@@ -129,7 +129,7 @@ static inline __attribute__((always_inline)) void add_shares(double sums[ALB_BLO
 }
 
 ALB_VECTOR_CLONES
-static void add_run(double sums[ALB_BLOCK][3], const stretch *run)
+static void add_run(double4 sums[ALB_BLOCK], const stretch *run)
 {
     if (run->kind == ALB_LINK_NODE)
         add_nodes(sums, run, false);
@@ -170,7 +170,7 @@ static inline __attribute__((always_inline)) void take_source(float8 *lit, float
     *bent = __builtin_shufflevector(light * spread, whole * spread, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-static inline __attribute__((always_inline)) void add_both(double sums[ALB_BLOCK][3], double evens[ALB_BLOCK][3],
+static inline __attribute__((always_inline)) void add_both(double4 sums[ALB_BLOCK], double4 evens[ALB_BLOCK],
                                                            const stretch *run, bool node, bool near)
 {
     float8 rows[ALB_BLOCK] = {{0}};
@@ -193,16 +193,15 @@ static inline __attribute__((always_inline)) void add_both(double sums[ALB_BLOCK
             }
         }
     }
-    for (int row = 0; row < ALB_BLOCK; row++)
-        for (int c = 0; c < 3; c++) {
-            sums[row][c] += (double)rows[row][c];
-            evens[row][c] += (double)rows[row][4 + c];
-        }
+    for (int row = 0; row < ALB_BLOCK; row++) {
+        sums[row] += __builtin_convertvector(__builtin_shufflevector(rows[row], rows[row], 0, 1, 2, 3), double4);
+        evens[row] += __builtin_convertvector(__builtin_shufflevector(rows[row], rows[row], 4, 5, 6, 7), double4);
+    }
 }
 
 // As add_run, and the same of even light.
 ALB_VECTOR_CLONES
-static void add_run_both(double sums[ALB_BLOCK][3], double evens[ALB_BLOCK][3], const stretch *run)
+static void add_run_both(double4 sums[ALB_BLOCK], double4 evens[ALB_BLOCK], const stretch *run)
 {
     if (run->kind == ALB_LINK_NODE)
         add_both(sums, evens, run, true, false);
@@ -241,7 +240,7 @@ static void pass(stretch *at)
     at->directions += at->kind <= ALB_LINK_NEAR_NODE ? at->count : 0;
 }
 
-static void add_pairs(double sums[ALB_BLOCK][3], double evens[ALB_BLOCK][3], const alb_link_block *block,
+static void add_pairs(double4 sums[ALB_BLOCK], double4 evens[ALB_BLOCK], const alb_link_block *block,
                       const alb_forest *forest, const alb_scatter_kernel *kernels, unsigned sides)
 {
     for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++)
@@ -270,7 +269,7 @@ void alb_product_add(double (*out)[3], double (*even)[3], const alb_links *links
 #pragma omp parallel for schedule(dynamic, 16)
     for (size_t b = 0; b < links->block_count; b++) {
         const alb_link_block *block = &links->blocks[b];
-        double sums[ALB_BLOCK][3] = {{0}}, evens[ALB_BLOCK][3] = {{0}};
+        double4 sums[ALB_BLOCK] = {{0}}, evens[ALB_BLOCK] = {{0}};
         stretch at = begin(block, forest);
         for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; pass(&at), run++) {
             take(&at, run, kernels);
