@@ -63,20 +63,17 @@ static void note(run *r)
     report->residual = report->history[report->iterations++] = worst_of(r, length);
 }
 
-// What the patches send out of E + g on each cluster, as S~ has it.
+// M + S~ (E + P g), from Q E + g in r->settled.
 static void send_roughly(alb_rgb *out, const run *r)
 {
     const alb_clusters *clusters = &r->equations->clusters;
+    alb_clusters_move(r->sent, clusters, (const alb_rgb *)r->settled, (const alb_rgb *)r->even);
 #pragma omp parallel for schedule(static)
-    for (size_t p = 0; p < clusters->patch_count; p++) {
-        const uint16_t k = clusters->cluster[p];
-        for (int c = 0; c < 3; c++) {
-            const double e = r->irradiance ? r->irradiance[p][c] : 0, m = r->exitance ? r->exitance[p][c] : 0,
-                         kept = clusters->kept[k][c];
-            const double share = kept > 0 ? r->sent[k][c] / kept : 0;
-            out[p][c] = m + clusters->sums[p][c] * (share + e - r->even[k][c]);
-        }
-    }
+    for (size_t p = 0; p < clusters->patch_count; p++)
+        for (int c = 0; c < 3; c++)
+            out[p][c] =
+                (r->exitance ? r->exitance[p][c] : 0) +
+                alb_clusters_sent(clusters, (const alb_rgb *)r->sent, p, c, r->irradiance ? r->irradiance[p][c] : 0);
 }
 
 // h from nothing, in r->light.
@@ -88,7 +85,6 @@ static void start_with_clusters(run *r)
     for (size_t k = 0; k < count; k++) // E + g
         for (int c = 0; c < 3; c++)
             settled[k][c] += even[k][c];
-    alb_clusters_scatter(sent, clusters, (const alb_rgb *)settled);
     send_roughly(r->rest, r);
     alb_form_factors_apply(r->light, r->equations->factors, (const alb_rgb *)r->rest);
     alb_clusters_average(sent, clusters, (const alb_rgb *)r->light);
