@@ -42,13 +42,16 @@ static void find_bounds(run *r)
     for (size_t p = 0; p < scatter->patch_count; p++)
         for (int c = 0; c < 3; c++)
             rows[c] = fmax(rows[c], scatter->row_sums[p][c]);
-    for (int c = 0; c < 3; c++)
-        r->bound[c] = r->squares[c] > 0 ? sqrt(rows[c] * r->space.total_mm2 / r->squares[c]) : 0;
+    for (int c = 0; c < 3; c++) {
+        const double square = isfinite(r->squares[c]) ? r->squares[c] : (double)NAN;
+        r->bound[c] = square == 0 ? 0 : sqrt(rows[c] * r->space.total_mm2 / square);
+    }
 }
 
 static double worst_of(const run *r, const double length[3])
 {
-    return fmax(r->bound[0] * length[0], fmax(r->bound[1] * length[1], r->bound[2] * length[2]));
+    return alb_rgb_largest(
+        (const double[3]){r->bound[0] * length[0], r->bound[1] * length[1], r->bound[2] * length[2]});
 }
 
 // Notes the rest after a product.
@@ -137,25 +140,6 @@ static void settle(run *r)
     note(r);
 }
 
-// along[k] orthogonal to those before and one long, sends[k] with it.
-static void orthonormalise(run *r, int k)
-{
-    double dots[STEPS][3], length[3], factor[3];
-    for (int round = 0; k && round < 2; round++) {
-        alb_space_dots(dots, &r->space, (const alb_rgb *)r->along[k], r->along, k);
-        for (int i = 0; i < k; i++)
-            for (int c = 0; c < 3; c++)
-                dots[i][c] = -dots[i][c];
-        alb_space_add(NULL, &r->space, r->along[k], (const double(*)[3])dots, r->along, k);
-        alb_space_add(NULL, &r->space, r->sends[k], (const double(*)[3])dots, r->sends, k);
-    }
-    alb_space_norm(length, &r->space, (const alb_rgb *)r->along[k]);
-    for (int c = 0; c < 3; c++)
-        factor[c] = length[c] > 0 ? 1 / length[c] : 0;
-    alb_space_scale(&r->space, r->along[k], factor);
-    alb_space_scale(&r->space, r->sends[k], factor);
-}
-
 static bool step(run *r, int k, alb_error *error)
 {
     double factors[1][3];
@@ -170,7 +154,7 @@ static bool step(run *r, int k, alb_error *error)
     alb_form_factors_apply(r->along[k], r->equations->factors, (const alb_rgb *)r->sends[k]);
     alb_space_add(NULL, &r->space, r->light, minus_one, &r->along[k], 1);
     swap(&r->light, &r->along[k]);
-    orthonormalise(r, k);
+    alb_space_orthonormalise(&r->space, r->along, r->sends, k, 0);
     alb_space_dots(factors, &r->space, (const alb_rgb *)r->rest, &r->along[k], 1);
     alb_space_add(NULL, &r->space, r->radiosity, (const double(*)[3])factors, &r->sends[k], 1);
     for (int c = 0; c < 3; c++)
@@ -198,7 +182,7 @@ static bool iterate(run *r, double residual, alb_error *error)
             return true;
         alb_form_factors_apply(r->light, r->equations->factors, (const alb_rgb *)r->radiosity);
         settle(r);
-        if (report->residual <= residual || report->iterations >= ALB_PRODUCTS_MAX ||
+        if (!(report->residual > residual) || report->iterations >= ALB_PRODUCTS_MAX ||
             (report->residual <= r->floor && report->residual > 0.5 * first))
             return true;
     }
@@ -254,7 +238,7 @@ static bool solve(run *r, const alb_rgb *start, double residual, alb_error *erro
     if (!iterate(r, residual, error))
         return false;
     alb_space_mean(r->report->residual_flux, &r->space, (const alb_rgb *)r->rest);
-    return alb_solver_check(r->report, ALB_SOLVER_TWO_LEVEL, residual, r->floor, error);
+    return alb_solver_check(r->report, ALB_SOLVER_TWO_LEVEL, residual, r->floor, r->irradiance, n, error);
 }
 
 bool alb_two_level_run(alb_rgb *radiosity, alb_radiosity_report *report, const alb_radiosity *equations,
