@@ -77,9 +77,11 @@ void alb_form_factors_half_difference(double (*out)[3], const alb_form_factors *
                                       const double sky[3]);
 // rms error over the patches in percent of the rms irradiance, the worst channel and the worse of two means, of the
 // patches and over their area, as a bound that holds in 95 % of draws of the rays; 0 where all is black. NAN where a
-// patch has a single ray and so no halves.
-bool alb_form_factors_error(double *percent, const alb_form_factors *factors, const double (*radiosity)[3],
-                            const double sky[3], alb_error *error);
+// patch has a single ray and so no halves. direct (NULL: none, and *of_all_percent stays) is the irradiance of the
+// lights, the sky's with it: *of_all_percent is the same error in percent of both together.
+bool alb_form_factors_error(double *percent, double *of_all_percent, const alb_form_factors *factors,
+                            const double (*radiosity)[3], const double (*direct)[3], const double sky[3],
+                            alb_error *error);
 // Casts rows again with as many rays as bring that error to `percent`, for light like `radiosity` (a first solution),
 // more where the halves differ more, and never fewer than `rays` or more than rays_max. *reached (may be NULL) is
 // the error that the new rows state. It fails as create does; the rows are then what they were.

@@ -4,6 +4,9 @@
 // random rays E d^2 is the variance of I. A lattice's halves are lattices of R/2, each of which errs 2^a times as much
 // as the whole, a from 1/2 to 1: d then says up to 1.4 too much, on fine meshes 1.3 to 1.6.
 //
+// Of the irradiance from lights and patches together it is that times the root of (mean I^2 / mean (I + E)^2), E that
+// of the lights: the larger root of the two means.
+//
 // Refining: with s_p^2 the mean d^2 of 33 patches along a Morton curve around p (one patch's d is one draw, and rays
 // may have missed a small lamp altogether), (1 + g) times as many rays for p take s_p^2 (1 - (1+g)^(-2a)) off the sum
 // of squares for g R_p rays. Rows grow while that gain a ray is above the one threshold that brings the sum to what is
@@ -14,6 +17,7 @@
 #include "base/memory.h"
 #include "base/morton.h"
 #include "render/form_factor.h"
+#include "render/radiosity_vectors.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -41,31 +45,38 @@ static double mean_area(const alb_form_factors *factors)
     return sum / (double)factors->patch_count;
 }
 
-// Mean square of each channel of the irradiance, the sky's share with it.
-static void mean_squares(double out[WAYS][3], const rgb *irradiance, const alb_form_factors *factors,
+// Mean square of each channel of the irradiance, with that of the lights (NULL: with the sky's share).
+static void mean_squares(double out[WAYS][3], const rgb *irradiance, const rgb *direct, const alb_form_factors *factors,
                          const double sky[3], double mean_mm2)
 {
     memset(out, 0, WAYS * sizeof *out);
     for (size_t p = 0; p < factors->patch_count; p++)
         for (int c = 0; c < 3; c++) {
-            const double all = irradiance[p][c] + (sky ? sky[c] * alb_form_factors_sky_share(factors, p) : 0);
+            const double all = irradiance[p][c] + (direct ? direct[p][c]
+                                                   : sky  ? sky[c] * alb_form_factors_sky_share(factors, p)
+                                                          : 0);
             for (int way = 0; way < WAYS; way++)
                 out[way][c] += weight(factors, p, way, mean_mm2) * all * all / (double)factors->patch_count;
         }
 }
 
 // squares[p][c] = w d^2 / mean w I^2, w 1 or the area, of the two ways the one whose sum is larger; zero in a channel
-// that is black.
-static bool relative_squares(rgb *squares, const alb_form_factors *factors, const rgb *radiosity, const double sky[3],
-                             alb_error *error)
+// that is black. direct: shares[c] = mean w I^2 / mean w (I + E)^2, of the two ways the larger; NULL: none wanted.
+static bool relative_squares(rgb *squares, double shares[3], const alb_form_factors *factors, const rgb *radiosity,
+                             const rgb *direct, const double sky[3], alb_error *error)
 {
-    double mean[WAYS][3], sums[WAYS][3] = {{0}};
+    double mean[WAYS][3], all[WAYS][3], sums[WAYS][3] = {{0}};
     const double mean_mm2 = mean_area(factors);
     rgb *irradiance = alb_allocate(factors->patch_count, sizeof *irradiance, error);
     if (!irradiance)
         return false;
     alb_form_factors_apply(irradiance, factors, radiosity);
-    mean_squares(mean, (const rgb *)irradiance, factors, sky, mean_mm2);
+    mean_squares(mean, (const rgb *)irradiance, NULL, factors, sky, mean_mm2);
+    if (direct)
+        mean_squares(all, (const rgb *)irradiance, direct, factors, sky, mean_mm2);
+    for (int c = 0; direct && c < 3; c++)
+        shares[c] = fmax(all[BY_PATCH][c] > 0 ? mean[BY_PATCH][c] / all[BY_PATCH][c] : 1,
+                         all[BY_AREA][c] > 0 ? mean[BY_AREA][c] / all[BY_AREA][c] : 1);
     free(irradiance);
     alb_form_factors_half_difference(squares, factors, radiosity, sky);
     for (size_t p = 0; p < factors->patch_count; p++)
@@ -83,11 +94,11 @@ static bool relative_squares(rgb *squares, const alb_form_factors *factors, cons
     return true;
 }
 
-// From an upper bound on the mean: the error and its half difference scatter alike, each by the standard error of the
-// mean, so apart by sqrt 2 of it.
-static double worst_percent(const rgb *squares, size_t count)
+// Upper bounds on the means, of each channel: the error and its half difference scatter alike, each by the standard
+// error of the mean, so apart by sqrt 2 of it.
+static void bound_means(double bounds[3], const rgb *squares, size_t count)
 {
-    double worst = 0, n = (double)count;
+    const double n = (double)count;
     for (int c = 0; c < 3; c++) {
         double sum = 0, sum_of_squares = 0;
         for (size_t p = 0; p < count; p++) {
@@ -95,20 +106,25 @@ static double worst_percent(const rgb *squares, size_t count)
             sum_of_squares += squares[p][c] * squares[p][c];
         }
         const double mean = sum / n, variance = fmax(0, sum_of_squares / n - mean * mean);
-        if (isnan(sum)) // fmax would leave it out
-            return (double)NAN;
-        worst = fmax(worst, mean + quantile * sqrt(2 * variance / n));
+        bounds[c] = mean + quantile * sqrt(2 * variance / n);
     }
-    return 100 * sqrt(worst);
 }
 
-bool alb_form_factors_error(double *percent, const alb_form_factors *factors, const double (*radiosity)[3],
-                            const double sky[3], alb_error *error)
+bool alb_form_factors_error(double *percent, double *of_all_percent, const alb_form_factors *factors,
+                            const double (*radiosity)[3], const double (*direct)[3], const double sky[3],
+                            alb_error *error)
 {
+    double shares[3], bounds[3];
     rgb *squares = alb_allocate(factors->patch_count, sizeof *squares, error);
-    const bool ok = squares && relative_squares(squares, factors, radiosity, sky, error);
-    if (ok)
-        *percent = worst_percent((const rgb *)squares, factors->patch_count);
+    const bool ok = squares && relative_squares(squares, shares, factors, radiosity, direct, sky, error);
+    if (ok) {
+        bound_means(bounds, (const rgb *)squares, factors->patch_count);
+        *percent = 100 * sqrt(alb_rgb_largest(bounds));
+    }
+    for (int c = 0; ok && direct && c < 3; c++)
+        bounds[c] *= shares[c];
+    if (ok && direct)
+        *of_all_percent = 100 * sqrt(alb_rgb_largest(bounds));
     free(squares);
     return ok;
 }
@@ -214,10 +230,13 @@ bool alb_form_factors_refine(double *reached, alb_form_factors *factors, const a
     double *pooled = alb_allocate(n, sizeof *pooled, error);
     uint32_t *lengths = alb_allocate(n, sizeof *lengths, error);
     bool ok = squares && pooled && lengths;
-    double now = INFINITY;
+    double now = INFINITY, bounds[3];
     for (int round = 0; ok; round++) {
-        ok = relative_squares(squares, factors, radiosity, sky, error);
-        now = ok ? worst_percent((const rgb *)squares, n) : now;
+        ok = relative_squares(squares, NULL, factors, radiosity, NULL, sky, error);
+        if (ok) {
+            bound_means(bounds, (const rgb *)squares, n);
+            now = 100 * sqrt(alb_rgb_largest(bounds));
+        }
         if (!ok || now <= percent || round == ROUNDS || !(ok = pool(pooled, (const rgb *)squares, patches, error)))
             break;
         choose_lengths(lengths, factors, pooled, total(pooled, n) * pow(margin * percent / now, 2), rays_max);

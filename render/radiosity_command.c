@@ -61,6 +61,11 @@ static void warn(const alb_scene *scene, const alb_solution *s)
         fprintf(stderr,
                 "render: %zu translucent bodies are not closed; light paths inside them are taken as straight\n", open);
     alb_scatter_note(stderr, "render: ", &s->scatter);
+    if (s->report.residual > scene->residual)
+        fprintf(stderr,
+                "render: residual %.1e reached, %g asked for: products in single precision round to about 1e-7 of the "
+                "light\n",
+                s->report.residual, scene->residual);
     if (s->column_sum > 1)
         fprintf(stderr, "render: the mesh is coarse for its scattering: a patch gives back %.4f of its flux\n",
                 s->column_sum);
@@ -82,8 +87,11 @@ static void put_json(alb_json *json, const alb_scene *scene, const alb_solution 
     alb_json_integer(json, "links", (long)s->scatter.link_count);
     alb_json_integer(json, "iterations", s->report.iterations);
     alb_json_number(json, "residual", s->report.residual);
+    alb_json_number(json, "residual_asked", scene->residual);
+    alb_json_boolean(json, "residual_reached", s->report.residual <= scene->residual);
     alb_json_number(json, "radiosity_bound_percent", 100 * s->bound);
     alb_json_number(json, "rays_error_percent", s->rays_error_percent);
+    alb_json_number(json, "irradiance_error_percent", s->irradiance_error_percent);
     alb_json_number(json, "stated_error_percent", s->stated_error_percent);
     alb_json_number(json, "largest_row_sum", s->row_sum);
     alb_json_number(json, "largest_column_sum", s->column_sum);
@@ -124,9 +132,10 @@ static void report(sequence *s, const alb_scene *scene, const alb_frame_files *f
     } else if (s->as_json) {
         put_json(&s->json, scene, solution, view_s, s->exposure);
     } else {
-        printf("%s: %zu patches, %d products to residual %.1e, stated error %.2f %%, largest row sum %.4f, %.1f s\n",
+        printf("%s: %zu patches, %d products to residual %.1e, stated error %.2f %% of all light (%.2f %% of what rays "
+               "gather), largest row sum %.4f, %.1f s\n",
                files->picture, solution->patches.count, solution->report.iterations, solution->report.residual,
-               solution->stated_error_percent, solution->row_sum, total_s);
+               solution->stated_error_percent, solution->rays_error_percent, solution->row_sum, total_s);
         fflush(stdout);
     }
 }

@@ -27,8 +27,9 @@
 // "smooth", lights none, rays_per_patch 256, memory_mb 4096, residual 1e-4 and seed 1 are what stands where nothing is
 // written. rays_per_patch is 2 or more: its halves tell the error. With error_percent, rows start at rays_per_patch (64
 // where nothing is written) and grow until the rms error of the irradiance by rays is that or every row has
-// ALB_RAYS_REFINED_MAX. Rays beyond memory_mb lie in a temporary file. With frames above 1 every run of # in the name
-// of a file stands for the frame's number, 0 to frames - 1, with zeros in front. For --method shadow objects take
+// ALB_RAYS_REFINED_MAX. Products are of single precision: a residual of 1e-6 of the light or less may be out of reach,
+// and what is reached is said. Rays beyond memory_mb lie in a temporary file. With frames above 1 every run of # in the
+// name of a file stands for the frame's number, 0 to frames - 1, with zeros in front. For --method shadow objects take
 // "shadow": "casts" (what stands where nothing is written) | "receives" and "rigid": true for what moves as one body
 // with all that is rigid, and an environment with radius_mm lies on a sphere of that radius instead of infinitely far
 // away. Paths are relative to the file. Units are the user's as long as they agree: flux 1 makes the picture radiance

@@ -169,10 +169,11 @@ static bool take_stock(alb_solution *s, const alb_scene *scene, alb_error *error
         return false;
     sky_radiosity(sky, scene);
     s->bound = alb_radiosity_bound(&s->equations, &s->report, (const double(*)[3])s->radiosity);
-    if (!alb_form_factors_error(&s->rays_error_percent, &s->factors, (const double(*)[3])s->radiosity, sky, error))
+    if (!alb_form_factors_error(&s->rays_error_percent, &s->irradiance_error_percent, &s->factors,
+                                (const double(*)[3])s->radiosity, (const double(*)[3])s->irradiance, sky, error))
         return false;
     const double scattered_percent = s->scatter.body_count ? 100 * scatter_error(scene) : 0;
-    s->stated_error_percent = hypot(s->rays_error_percent, scattered_percent) + 100 * s->bound;
+    s->stated_error_percent = hypot(s->irradiance_error_percent, scattered_percent) + 100 * s->bound;
     return take_irradiance(s, scene, error);
 }
 

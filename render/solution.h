@@ -35,10 +35,11 @@ typedef struct alb_solution {
     double (*radiosity)[3];  // all that leaves
     double (*across)[3];     // the part of it that crossed a slab with smooth faces; NULL where there is none
     alb_radiosity_report report;
-    double bound;                // how far the radiosity may be from its equations' exact solution, as a share of power
-    double rays_error_percent;   // of the irradiance by rays, rms, stated from their halves; NAN: a single ray
-    double stated_error_percent; // rms of the radiosity: rays and sampled scattering at random, and the bound on top
-    double row_sum, column_sum;  // largest of S'
+    double bound;              // how far the radiosity may be from its equations' exact solution, as a share of power
+    double rays_error_percent; // of the irradiance by rays, rms, stated from their halves; NAN: a single ray
+    double irradiance_error_percent; // the same of all irradiance, that of the lights with it
+    double stated_error_percent;     // of all light, rms: irradiance and sampled scattering at random, the bound on top
+    double row_sum, column_sum;      // largest of S'
     alb_balance balance;
     double seconds[ALB_STAGES];
     size_t bytes[ALB_STAGES];

@@ -161,6 +161,26 @@ static void scenes_at_their_ends(void **state)
     assert_null(strstr(output, "\"in\": [0, 0, 0]"));
 }
 
+// A residual below what single precision holds is not reached: the picture is made, and what was reached is said.
+static void residuals_below_rounding(void **state)
+{
+    (void)state;
+    static const char *const asked[2] = {"1e-12", "1e-4"};
+    for (int k = 0; k < 2; k++) {
+        char text[1024];
+        snprintf(text, sizeof text,
+                 "%s16,\"residual\":%s,\"seed\":3,\"materials\":{\"wall\":{\"reflectance\":[0.97,0.9,0.8]}},"
+                 "\"objects\":[{\"shape\":\"box\",\"size_mm\":[9,9,9],\"centre_mm\":[0,0,0],\"cells\":[6,6,6],"
+                 "\"inward\":true,\"material\":\"wall\"}],\"lights\":[{\"kind\":\"point\",\"position_mm\":[1,2,3],"
+                 "\"flux\":[1,1,1]}]}",
+                 scene_start, asked[k]);
+        save_text("hostile/residual.json", text);
+        assert_int_equal(run("render hostile/residual.json -o hostile/x.exr --json"), 0);
+        assert_true((strstr(complaint, "1e-12 asked for") != NULL) == (k == 0));
+        assert_non_null(strstr(output, k ? "\"residual_reached\": true" : "\"residual_reached\": false"));
+    }
+}
+
 // A fit's files change together or not at all: here the table fits on the disk and the page does not.
 static void results_that_do_not_fit(void **state)
 {
@@ -305,6 +325,7 @@ int main(void)
         cmocka_unit_test(results_that_do_not_fit),    cmocka_unit_test(exports_of_odd_names),
         cmocka_unit_test(materials_that_lie),         cmocka_unit_test(pictures_that_lie),
         cmocka_unit_test(spot_in_a_corner),           cmocka_unit_test(undecided_total),
+        cmocka_unit_test(residuals_below_rounding),
     };
     return cmocka_run_group_tests(tests, make_inputs, remove_inputs);
 }

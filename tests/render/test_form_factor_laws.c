@@ -78,7 +78,7 @@ static double stated_percent(const world *w, const double (*light)[3])
     alb_error error = {0};
     double stated;
     cast(&f, w, 256, 1);
-    check_ok(alb_form_factors_error(&stated, &f, light, NULL, &error), &error);
+    check_ok(alb_form_factors_error(&stated, NULL, &f, light, NULL, NULL, &error), &error);
     alb_form_factors_free(&f);
     return stated;
 }

@@ -205,7 +205,7 @@ static void products_are_few_at_any_albedo(void **state)
             }
             check_below(off / all, s.bound);
         }
-        check_near(s.stated_error_percent, hypot(s.rays_error_percent, 0.5) + 100 * s.bound, 1e-12);
+        check_near(s.stated_error_percent, hypot(s.irradiance_error_percent, 0.5) + 100 * s.bound, 1e-12);
         alb_solution_free(&s);
         alb_solution_free(&exact);
     }
