@@ -202,6 +202,8 @@ static bool number_of(double *out, const json_t *value, double minimum, double m
 
 bool alb_node_null(alb_node object, const char *key) { return json_is_null(json_object_get(object.value, key)); }
 
+bool alb_node_is_text(alb_node object, const char *key) { return json_is_string(json_object_get(object.value, key)); }
+
 bool alb_node_item_null(alb_node list, size_t i) { return json_is_null(json_array_get(list.value, i)); }
 
 bool alb_node_number(double *out, alb_node object, const char *key, double minimum, double maximum, alb_error *error)

@@ -23,7 +23,8 @@ bool alb_record_root(alb_node *root, const alb_record *record, alb_error *error)
 // Fails unless every key of the object is one of the space-separated `keys`.
 bool alb_node_allow(alb_node object, const char *keys, alb_error *error);
 bool alb_node_has(alb_node object, const char *key);
-bool alb_node_null(alb_node object, const char *key); // null stands there
+bool alb_node_null(alb_node object, const char *key);    // null stands there
+bool alb_node_is_text(alb_node object, const char *key); // a text does
 bool alb_node_item_null(alb_node list, size_t i);
 // Required values. Numbers must be finite and within [minimum, maximum].
 bool alb_node_number(double *out, alb_node object, const char *key, double minimum, double maximum, alb_error *error);

@@ -124,12 +124,10 @@ static bool read_light(alb_light *light, alb_scene_reader *in, alb_node node)
     return read_beam(light, node, in->error);
 }
 
-static bool read_lights(alb_scene_reader *in, alb_node root)
+static bool read_light_list(alb_scene_reader *in, alb_node root)
 {
     alb_node list, node;
     size_t count = 0;
-    if (!alb_node_has(root, "lights"))
-        return true;
     if (!alb_node_list(&list, &count, root, "lights", in->error))
         return false;
     if (count > ALB_LIGHTS_MAX)
@@ -141,6 +139,26 @@ static bool read_lights(alb_scene_reader *in, alb_node root)
         if (!alb_node_item_object(&node, list, i, in->error) || !read_light(&in->scene->lights[i], in, node))
             return false;
     return true;
+}
+
+// In the scene, or in a file of their own: {"format": 1, "lights": [...]}, whose paths are relative to it.
+static bool read_lights(alb_scene_reader *in, alb_node root)
+{
+    char path[ALB_PATH_SIZE], folder[ALB_PATH_SIZE];
+    alb_scene_reader apart = *in;
+    alb_node top;
+    if (!alb_node_has(root, "lights"))
+        return true;
+    if (!alb_node_is_text(root, "lights"))
+        return read_light_list(in, root);
+    apart.folder = folder;
+    if (!alb_scene_input(path, in, root, "lights") || !alb_path_folder(folder, path, in->error))
+        return false;
+    alb_record *record = alb_record_read(path, in->error);
+    const bool ok = record && alb_record_root(&top, record, in->error) &&
+                    alb_node_allow(top, "format lights", in->error) && read_light_list(&apart, top);
+    alb_record_free(record);
+    return ok;
 }
 
 static bool read_calibrated(alb_scene_reader *in, alb_node node)
@@ -239,7 +257,7 @@ bool alb_scene_read_frame(alb_scene *scene, alb_provenance *provenance, const ch
                        "frames",
                        error) &&
         read_settings(scene, root, error) && alb_scene_read_surfaces(&in, root) && alb_scene_read_objects(&in, root) &&
-        read_lights(&in, root) && read_camera(&in, root);
+        (scene->body_inputs = provenance->input_count) && read_lights(&in, root) && read_camera(&in, root);
     alb_record_free(record);
     if (!ok)
         alb_scene_free(scene);

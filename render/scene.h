@@ -18,6 +18,7 @@
 //               {"kind": "projector", "centre_mm": [..], "direction": [..], "blur_sd_mm": 0.1, "flux": [..],
 //                "diameter_mm": 1 | "pixel_mm": 0.25, "diameter_px": 4},
 //               {"kind": "environment", "radiance": [..] | "file": "sky.exr", "centre_mm": [..], "radius_mm": 500}],
+//              | "lights.json", which holds {"format": 1, "lights": [as here]},
 //    "camera": {"calibration": "SESSION", "side": "reflection"} |
 //              {"position_mm": [..], "look_at_mm": [..], "up": [0,1,0], "vertical_field_deg": 40,
 //               "width": 640, "height": 480},
@@ -69,7 +70,8 @@ typedef struct alb_scene {
     size_t memory_bytes;  // 0: no limit
     double residual;
     uint64_t seed;
-    int frames; // of the sequence; 1: a still
+    int frames;      // of the sequence; 1: a still
+    int body_inputs; // of the provenance's inputs those, the first, that meshes and materials were read from
 } alb_scene;
 
 // Reads the scene and all it refers to; every file read is added to the provenance's inputs. Of a sequence the first

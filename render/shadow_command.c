@@ -2,20 +2,15 @@
 // frame to frame, so that neither bounding spheres nor brightness flicker.
 #include "render/shadow_command.h"
 #include "base/command.h"
-#include "base/exr.h"
 #include "base/progress.h"
+#include "render/picture_files.h"
 #include "render/shadow_advisor.h"
 #include "render/shadow_picture.h"
 #include "render/view.h"
 #include <stdio.h>
-#include <string.h>
-
-typedef struct targets {
-    const char *scene, *picture, *png;
-} targets;
 
 typedef struct sequence {
-    targets to;
+    alb_picture_files to;
     alb_shadow_stage stage;
     double exposure, wanted_percent; // 0: none yet, none stated
     alb_shadow_verdict verdict;
@@ -25,48 +20,15 @@ typedef struct sequence {
     int frames;
 } sequence;
 
-static bool name_frame(char picture[ALB_PATH_SIZE], char png[ALB_PATH_SIZE], const targets *to, int frame, int frames,
-                       alb_error *error)
+static bool write_frame(sequence *s, const alb_scene *scene, const alb_provenance *provenance,
+                        const alb_frame_files *files, alb_error *error)
 {
-    char beside[ALB_PATH_SIZE];
-    const size_t length = strlen(to->picture),
-                 stem = length >= 4 && !strcmp(to->picture + length - 4, ".exr") ? length - 4 : length;
-    if (snprintf(beside, sizeof beside, "%.*s.png", (int)stem, to->picture) >= ALB_PATH_SIZE)
-        return alb_fail(error, ALB_USAGE, "%s: the path is too long", to->picture);
-    const char *const second = to->png ? to->png : beside;
-    if (frames > 1 && (!strchr(to->picture, '#') || !strchr(second, '#')))
-        return alb_fail(error, ALB_USAGE, "%s is one file for %d frames; put #### where their numbers should stand",
-                        strchr(to->picture, '#') ? second : to->picture, frames);
-    return alb_scene_frame_name(picture, to->picture, frame, error) && alb_scene_frame_name(png, second, frame, error);
-}
-
-static bool check_targets(const targets *to, int frame, int frames, alb_error *error)
-{
-    char picture[ALB_PATH_SIZE], png[ALB_PATH_SIZE];
-    if (!name_frame(picture, png, to, frame, frames, error))
-        return false;
-    if (alb_file_same(picture, png) || alb_file_same(picture, to->scene) || alb_file_same(png, to->scene))
-        return alb_fail(error, ALB_USAGE, "%s is given for two files; give each its own", picture);
-    return alb_file_check_target(picture, error) && alb_file_check_target(png, error);
-}
-
-static bool write_frame(sequence *s, const alb_scene *scene, const alb_provenance *provenance, int frame,
-                        alb_error *error)
-{
-    char path[ALB_PATH_SIZE], png[ALB_PATH_SIZE];
     alb_image picture = {0};
-    alb_json json;
     double brightest;
-    alb_json_begin(&json, provenance);
-    alb_json_end_object(&json);
-    bool ok = (!json.text.failed || alb_fail(error, ALB_NO_MEMORY, "out of memory for the provenance")) &&
-              name_frame(path, png, &s->to, frame, scene->frames, error) &&
-              alb_shadow_view(&picture, &brightest, scene, &s->stage, error);
+    bool ok = alb_shadow_view(&picture, &brightest, scene, &s->stage, error);
     if (ok && !(s->exposure > 0))
         ok = alb_view_exposure(&s->exposure, &picture, brightest, error);
-    ok = ok && alb_exr_write(&picture, json.text.bytes, path, error) &&
-         alb_image_write_png(&picture, s->exposure, png, error);
-    alb_json_free(&json);
+    ok = ok && alb_frame_files_write(files, &picture, s->exposure, provenance, error);
     alb_image_free(&picture);
     return ok;
 }
@@ -92,16 +54,17 @@ static bool light_first(sequence *s, const alb_scene *scene, alb_error *error)
 static bool render_frame(sequence *s, int frame, alb_error *error)
 {
     alb_scene scene;
+    alb_frame_files files;
     alb_provenance provenance = {.command = "render"};
     if (!alb_scene_read_frame(&scene, &provenance, s->to.scene, frame, error))
         return false;
     snprintf(provenance.options, sizeof provenance.options,
              "method shadow, frame %d of %d, error_percent %g, seed %llu", frame, scene.frames, s->wanted_percent,
              (unsigned long long)scene.seed);
-    bool ok = check_targets(&s->to, frame, scene.frames, error);
+    bool ok = alb_frame_files_name(&files, &s->to, frame, scene.frames, error);
     ok = ok && (frame ? alb_shadow_stage_light(&s->stage, &scene, error) : light_first(s, &scene, error));
     const double start_s = alb_clock_s();
-    ok = ok && write_frame(s, &scene, &provenance, frame, error);
+    ok = ok && write_frame(s, &scene, &provenance, &files, error);
     s->view_s += alb_clock_s() - start_s;
     s->transport_s = s->stage.transport_s;
     s->sampling_s += s->stage.sampling_s;
@@ -167,7 +130,9 @@ static bool report(const sequence *s, bool as_json, alb_error *error)
 bool alb_shadow_render(const char *scene_path, const char *picture, const char *png, const char *mesh,
                        const char *stated_percent, bool json, alb_error *error)
 {
-    sequence s = {.to = {scene_path, picture, png}, .stage = {.settings = alb_shadow_defaults}, .frames = 1};
+    sequence s = {.to = {.scene = scene_path, .picture = picture, .png = png},
+                  .stage = {.settings = alb_shadow_defaults},
+                  .frames = 1};
     alb_progress progress;
     if (mesh)
         return alb_fail(error, ALB_USAGE, "--mesh belongs to radiosity; the shadow method writes pictures alone");
