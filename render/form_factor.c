@@ -84,27 +84,21 @@ static bool allocate(alb_form_factors *factors, const uint32_t *lengths, alb_err
                                              sizeof *factors->sky_mask, error));
 }
 
-// Where the hits come from: given in `hits`, or cast.
+// What rays are cast from and into.
 typedef struct source {
-    const uint32_t *hits; // row after row
     const alb_patches *patches;
     const alb_tracer *tracer;
-    float *nearness_per_mm; // of each patch, on return, where they are cast
+    float *nearness_per_mm; // of each patch, on return
 } source;
 
 static void take_row(uint32_t *row, alb_form_factors *factors, const source *from, size_t patch)
 {
-    const int rays = alb_form_factors_rays(factors, patch);
-    if (from->hits) {
-        memcpy(row, from->hits + patch * (size_t)rays, (size_t)rays * sizeof *row);
-    } else {
-        const alb_ray_pattern pattern = {rays, factors->seed, factors->sampling, factors->phases};
-        const size_t slipped = alb_rays_cast(row, &pattern, from->patches, from->tracer, patch);
-        __atomic_add_fetch(&factors->reshot_rays, slipped, __ATOMIC_RELAXED); // counting is the same in any order
-    }
+    const alb_ray_pattern pattern = {alb_form_factors_rays(factors, patch), factors->seed, factors->sampling,
+                                     factors->phases};
+    const size_t slipped = alb_rays_cast(row, &pattern, from->patches, from->tracer, patch);
+    __atomic_add_fetch(&factors->reshot_rays, slipped, __ATOMIC_RELAXED); // counting is the same in any order
     note_row(factors, row, patch);
-    if (from->nearness_per_mm)
-        from->nearness_per_mm[patch] = nearness_per_mm(factors, row, from->patches, patch);
+    from->nearness_per_mm[patch] = nearness_per_mm(factors, row, from->patches, patch);
 }
 
 // What no ray meets needs no shares.
@@ -180,34 +174,23 @@ static bool meet_neighbours(alb_form_factors *factors, const alb_patches *patche
     return true;
 }
 
-static bool build(alb_form_factors *factors, const source *given, const uint32_t *lengths, alb_error *error)
+static bool build(alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer,
+                  const uint32_t *lengths, alb_error *error)
 {
-    source from = *given;
-    double(*room)[3] = NULL;
-    const bool ok =
-        allocate(factors, lengths, error) &&
-        (!from.patches || ((from.nearness_per_mm = alb_allocate(factors->patch_count, sizeof(float), error)) &&
-                           (room = alb_allocate(factors->patch_count, sizeof *room, error)) &&
-                           meet_neighbours(factors, from.patches, error))) &&
-        fill(factors, &from, error);
-    if (ok && from.patches) {
-        alb_row_shares_limit(&factors->shares, from.patches, &factors->rows, from.nearness_per_mm);
+    const size_t n = factors->patch_count;
+    double(*room)[3] = alb_allocate(n, sizeof *room, error);
+    float *nearness_per_mm = room ? alb_allocate(n, sizeof *nearness_per_mm, error) : NULL;
+    const source from = {patches, tracer, nearness_per_mm};
+    const bool ok = nearness_per_mm && allocate(factors, lengths, error) && meet_neighbours(factors, patches, error) &&
+                    fill(factors, &from, error);
+    if (ok) {
+        alb_row_shares_limit(&factors->shares, patches, &factors->rows, nearness_per_mm);
         share_open_rays(factors, room);
     }
-    free(from.nearness_per_mm);
+    free(nearness_per_mm);
     free(room);
     if (!ok)
         alb_form_factors_free(factors);
-    return ok;
-}
-
-static bool build_even(alb_form_factors *factors, const source *from, alb_error *error)
-{
-    uint32_t *lengths = alb_allocate(factors->patch_count, sizeof *lengths, error);
-    for (size_t p = 0; lengths && p < factors->patch_count; p++)
-        lengths[p] = (uint32_t)factors->rays;
-    const bool ok = lengths && build(factors, from, lengths, error);
-    free(lengths);
     return ok;
 }
 
@@ -221,20 +204,18 @@ bool alb_form_factors_create_within(alb_form_factors *factors, const alb_patches
                                   .seed = seed,
                                   .sampling = sampling,
                                   .memory_bytes = memory_bytes};
-    return build_even(factors, &(source){.patches = patches, .tracer = tracer}, error);
+    uint32_t *lengths = alb_allocate(patches->count, sizeof *lengths, error);
+    for (size_t p = 0; lengths && p < patches->count; p++)
+        lengths[p] = (uint32_t)rays;
+    const bool ok = lengths && build(factors, patches, tracer, lengths, error);
+    free(lengths);
+    return ok;
 }
 
 bool alb_form_factors_create(alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer, int rays,
                              uint64_t seed, alb_sampling sampling, alb_error *error)
 {
     return alb_form_factors_create_within(factors, patches, tracer, rays, seed, sampling, 0, error);
-}
-
-bool alb_form_factors_from_hits(alb_form_factors *factors, const uint32_t *hits, size_t patch_count, int rays,
-                                alb_error *error)
-{
-    *factors = (alb_form_factors){.patch_count = patch_count, .rays = rays};
-    return build_even(factors, &(source){.hits = hits}, error);
 }
 
 bool alb_form_factors_cast_again(alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer,
@@ -246,7 +227,7 @@ bool alb_form_factors_cast_again(alb_form_factors *factors, const alb_patches *p
                               .seed = factors->seed,
                               .sampling = factors->sampling,
                               .memory_bytes = factors->memory_bytes};
-    if (!build(&again, &(source){.patches = patches, .tracer = tracer}, lengths, error))
+    if (!build(&again, patches, tracer, lengths, error))
         return false;
     alb_form_factors_free(factors);
     *factors = again;
@@ -279,46 +260,28 @@ void alb_form_factors_row(uint32_t *hits, const alb_form_factors *factors, size_
     alb_hit_rows_read(hits, &factors->rows, patch);
 }
 
+void alb_form_factors_group_row(uint32_t *hits, uint32_t length, const alb_form_factors *factors,
+                                const uint32_t *patches, size_t count, uint32_t *row)
+{
+    double all = 0, before = 0;
+    uint32_t q = 0;
+    for (size_t i = 0; i < count; i++)
+        all += factors->areas_mm2[patches[i]];
+    for (size_t i = 0; i < count; i++) {
+        const double area = factors->areas_mm2[patches[i]], step = all / length,
+                     rays = alb_form_factors_rays(factors, patches[i]);
+        alb_form_factors_row(row, factors, patches[i]);
+        for (; q < length && ((q + 0.5) * step < before + area || i + 1 == count); q++) {
+            const double into = fmin(fmax(((q + 0.5) * step - before) / area, 0), 1);
+            hits[q] = row[(size_t)fmin(into * rays, rays - 1)];
+        }
+        before += area;
+    }
+}
+
 alb_vector alb_form_factors_direction(const alb_form_factors *factors, const alb_patches *patches, size_t patch, int q)
 {
     const alb_ray_pattern pattern = {alb_form_factors_rays(factors, patch), factors->seed, factors->sampling,
                                      factors->phases};
     return alb_ray_direction(&pattern, patches, patch, q);
-}
-
-// --- products --------------------------------------------------------------------------------------------------------
-static void take_values(const alb_form_factors *factors, const double (*radiosity)[3], const double sky[3])
-{
-    const size_t n = factors->patch_count;
-#pragma omp parallel for schedule(static)
-    for (size_t p = 0; p < n; p++)
-        for (int c = 0; c < 3; c++)
-            factors->gathered[p][c] = (float)radiosity[p][c];
-    for (int c = 0; c < 3; c++)
-        factors->gathered[n][c] = sky ? (float)sky[c] : 0;
-}
-
-void alb_form_factors_share(double (*values)[3], const alb_form_factors *factors)
-{
-    alb_row_shares_apply(values, factors->gathered, &factors->shares);
-}
-
-void alb_form_factors_apply_rows(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3])
-{
-    take_values(factors, radiosity, NULL);
-    alb_hit_rows_gather(out, &factors->rows, (const float(*)[4])factors->gathered);
-}
-
-void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3])
-{
-    alb_form_factors_apply_rows(out, factors, radiosity);
-    alb_form_factors_share(out, factors);
-}
-
-void alb_form_factors_half_difference(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3],
-                                      const double sky[3])
-{
-    take_values(factors, radiosity, sky);
-    alb_hit_rows_gather_difference(out, &factors->rows, (const float(*)[4])factors->gathered);
-    alb_form_factors_share(out, factors);
 }

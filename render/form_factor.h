@@ -8,7 +8,7 @@ enum { ALB_RAYS_MAX = 1 << 16 }; // a patch
 
 typedef struct alb_form_factors {
     size_t patch_count;
-    const double *areas_mm2; // borrowed; NULL: of lists made elsewhere, all patches alike
+    const double *areas_mm2; // borrowed
     int rays;                // a patch, where a stated error has not asked for more
     uint64_t seed;
     alb_sampling sampling;
@@ -32,9 +32,6 @@ bool alb_form_factors_create(alb_form_factors *factors, const alb_patches *patch
 bool alb_form_factors_create_within(alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer,
                                     int rays, uint64_t seed, alb_sampling sampling, size_t memory_bytes,
                                     alb_error *error);
-// From lists made elsewhere: hits[patch * rays + q].
-bool alb_form_factors_from_hits(alb_form_factors *factors, const uint32_t *hits, size_t patch_count, int rays,
-                                alb_error *error);
 // Casts all rows again with lengths[patch] rays; where it fails they are what they were.
 bool alb_form_factors_cast_again(alb_form_factors *factors, const alb_patches *patches, const alb_tracer *tracer,
                                  const uint32_t *lengths, alb_error *error);
@@ -56,6 +53,10 @@ static inline double alb_form_factors_back_share(const alb_form_factors *factors
 }
 // What they hit: the even rays, ascending, then the odd ones, ascending. `hits` has room for all of them.
 void alb_form_factors_row(uint32_t *hits, const alb_form_factors *factors, size_t patch);
+// hits[0 .. length): one list for a group of patches, at equal steps through their area and through the list of each.
+// row: scratch for the longest list.
+void alb_form_factors_group_row(uint32_t *hits, uint32_t length, const alb_form_factors *factors,
+                                const uint32_t *patches, size_t count, uint32_t *row);
 // Whether ray q of the patch leaves the scene, and its direction: what lights the sky are asked for.
 bool alb_form_factors_sees_sky(const alb_form_factors *factors, size_t patch, int q);
 alb_vector alb_form_factors_direction(const alb_form_factors *factors, const alb_patches *patches, size_t patch, int q);

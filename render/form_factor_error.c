@@ -30,13 +30,13 @@ enum { BY_PATCH, BY_AREA, WAYS };
 
 static double weight(const alb_form_factors *factors, size_t patch, int way, double mean_mm2)
 {
-    return way == BY_AREA && factors->areas_mm2 ? factors->areas_mm2[patch] / mean_mm2 : 1;
+    return way == BY_AREA ? factors->areas_mm2[patch] / mean_mm2 : 1;
 }
 
 static double mean_area(const alb_form_factors *factors)
 {
     double sum = 0;
-    for (size_t p = 0; factors->areas_mm2 && p < factors->patch_count; p++)
+    for (size_t p = 0; p < factors->patch_count; p++)
         sum += factors->areas_mm2[p];
     return sum / (double)factors->patch_count;
 }

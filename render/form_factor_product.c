@@ -1,4 +1,4 @@
-// Products of packed hit lists with values per index:
+// Products of packed hit lists with values per index, and F radiosity from them:
 //     out_p = 1/R_p sum over the hits h of row p of value_h
 // They walk block by block through all chunks, so that the values of a block (at most 1 MiB) stay in a core's
 // cache; where the hits lie in a file, chunk by chunk, as the file does, and ask for the next chunk ahead. A
@@ -6,7 +6,7 @@
 // four lanes, so 64 additions deep: 1e-7), these sums in double.
 // Stops being fast where the hits of a row are few a block (more than ~2 million patches with 256 rays).
 #include "base/vector_clones.h"
-#include "render/form_factor_rows.h"
+#include "render/form_factor.h"
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
@@ -160,4 +160,41 @@ void alb_hit_rows_gather(double (*out)[3], const alb_hit_rows *rows, const float
 void alb_hit_rows_gather_difference(double (*out)[3], const alb_hit_rows *rows, const float (*values)[4])
 {
     run(&(product){out, rows, (const float4 *)values, true});
+}
+
+// --- products of F ---------------------------------------------------------------------------------------------------
+static void take_values(const alb_form_factors *factors, const double (*radiosity)[3], const double sky[3])
+{
+    const size_t n = factors->patch_count;
+#pragma omp parallel for schedule(static)
+    for (size_t p = 0; p < n; p++)
+        for (int c = 0; c < 3; c++)
+            factors->gathered[p][c] = (float)radiosity[p][c];
+    for (int c = 0; c < 3; c++)
+        factors->gathered[n][c] = sky ? (float)sky[c] : 0;
+}
+
+void alb_form_factors_share(double (*values)[3], const alb_form_factors *factors)
+{
+    alb_row_shares_apply(values, factors->gathered, &factors->shares);
+}
+
+void alb_form_factors_apply_rows(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3])
+{
+    take_values(factors, radiosity, NULL);
+    alb_hit_rows_gather(out, &factors->rows, (const float(*)[4])factors->gathered);
+}
+
+void alb_form_factors_apply(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3])
+{
+    alb_form_factors_apply_rows(out, factors, radiosity);
+    alb_form_factors_share(out, factors);
+}
+
+void alb_form_factors_half_difference(double (*out)[3], const alb_form_factors *factors, const double (*radiosity)[3],
+                                      const double sky[3])
+{
+    take_values(factors, radiosity, sky);
+    alb_hit_rows_gather_difference(out, &factors->rows, (const float(*)[4])factors->gathered);
+    alb_form_factors_share(out, factors);
 }

@@ -34,6 +34,15 @@ size_t alb_clusters_bytes(const alb_clusters *clusters);
 void alb_clusters_average(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *values);
 // out = S_c light: what clusters send out of irradiance even on each.
 void alb_clusters_scatter(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *light);
+// Roughly what patches send out, S~, of irradiance e with the means `even` once it is `light` on the clusters: S_c
+// between clusters, and what varies within one stays where it is. moved: of clusters, the even light that, added to
+// what is there, sends it; then patch by patch.
+void alb_clusters_move(alb_rgb *moved, const alb_clusters *clusters, const alb_rgb *light, const alb_rgb *even);
+static inline double alb_clusters_sent(const alb_clusters *clusters, const alb_rgb *moved, size_t patch, int channel,
+                                       double irradiance)
+{
+    return clusters->sums[patch][channel] * (moved[clusters->cluster[patch]][channel] + irradiance);
+}
 // out = F_c radiosity: irradiance of the clusters by each other, by one in `stride` of their rays.
 void alb_clusters_gather(alb_rgb *out, const alb_clusters *clusters, const alb_rgb *radiosity, int stride);
 // out = (I - F_c S_c)^-1 F_c radiosity: irradiance of the clusters by each other, for what they send out by themselves.

@@ -22,11 +22,10 @@ const char *const alb_solver_names[ALB_SOLVERS] = {"jacobi", "gauss_seidel", "en
 
 double alb_run_worst(const alb_run *run, const double length[3])
 {
-    double worst = 0;
+    double shares[3];
     for (int c = 0; c < 3; c++)
-        if (run->scale[c] > 0)
-            worst = fmax(worst, fabs(length[c]) / run->scale[c]);
-    return worst;
+        shares[c] = run->scale[c] == 0 ? 0 : fabs(length[c]) / run->scale[c];
+    return alb_rgb_largest(shares);
 }
 
 void alb_run_note(alb_run *run, double residual)
@@ -52,7 +51,7 @@ bool alb_run_residual(alb_run *run)
     alb_run_find_floor(run);
     run->report->residual = alb_run_worst(run, length);
     alb_run_note(run, run->report->residual);
-    return run->report->residual <= run->wanted || run->report->iterations >= ALB_PRODUCTS_MAX;
+    return !(run->report->residual > run->wanted) || run->report->iterations >= ALB_PRODUCTS_MAX;
 }
 
 static const double one[1][3] = {{1, 1, 1}}, minus_one[1][3] = {{-1, -1, -1}};
@@ -154,9 +153,26 @@ static bool take_start(alb_run *run, const alb_rgb *start, alb_error *error)
     return true;
 }
 
-bool alb_solver_check(const alb_radiosity_report *report, alb_solver solver, double residual, double floor,
-                      alb_error *error)
+// Names the first that is not finite.
+static bool check_light(const alb_rgb *light, size_t count, alb_error *error)
 {
+    for (size_t i = 0; light && i < count; i++)
+        for (int c = 0; c < 3; c++)
+            if (!isfinite(light[i][c]))
+                return alb_fail(error, ALB_BAD_DATA, "radiosity: the light on patch %zu, channel %c, is %g", i,
+                                "RGB"[c], light[i][c]);
+    return true;
+}
+
+bool alb_solver_check(const alb_radiosity_report *report, alb_solver solver, double residual, double floor,
+                      const alb_rgb *light, size_t count, alb_error *error)
+{
+    if (isnan(report->residual))
+        return check_light(light, count, error) &&
+               alb_fail(error, ALB_BAD_DATA,
+                        "radiosity: the residual is no number after %d products of %s: light, or what a product "
+                        "makes of it, is not finite or too bright for its square",
+                        report->iterations, alb_solver_names[solver]);
     return report->residual <= fmax(residual, floor) ||
            alb_fail(error, ALB_INTERNAL, "radiosity: residual %.3g after %d products of %s, asked for %.3g",
                     report->residual, report->iterations, alb_solver_names[solver], residual);
@@ -172,6 +188,8 @@ bool alb_solver_run(alb_rgb *x, alb_radiosity_report *report, alb_solver solver,
               (run.residual = alb_allocate(n, sizeof *run.residual, error));
     if (ok) {
         alb_space_norm(run.scale, &run.space, right);
+        for (int c = 0; c < 3; c++)
+            run.scale[c] = isfinite(run.scale[c]) ? run.scale[c] : (double)NAN; // or all would be small beside it
         memset(x, 0, n * sizeof *x);
         memcpy(run.residual, right, n * sizeof *x);
         if (run.scale[0] + run.scale[1] + run.scale[2] == 0)
@@ -182,7 +200,7 @@ bool alb_solver_run(alb_rgb *x, alb_radiosity_report *report, alb_solver solver,
     }
     if (ok && report->iterations)
         add_residual(&run); // the last bounce
-    ok = ok && alb_solver_check(report, solver, residual, run.floor, error);
+    ok = ok && alb_solver_check(report, solver, residual, run.floor, right, n, error);
     alb_space_free(&run.space);
     free(run.residual);
     return ok;

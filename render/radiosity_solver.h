@@ -39,6 +39,7 @@ typedef struct alb_radiosity_report {
 
 // Solves to the relative residual, or as near as rounding lets it come (ALB_RESIDUAL_LEAST). start (may be NULL) is
 // a guess, and costs one product. ALB_INTERNAL with the numbers where ALB_PRODUCTS_MAX products do not reach it;
+// ALB_BAD_DATA where light or products with it are not finite;
 // ALB_USAGE where the solver lacks what it needs of the bounce, as two_level does.
 bool alb_solver_run(alb_rgb *x, alb_radiosity_report *report, alb_solver solver, const alb_bounce *bounce,
                     const alb_rgb *right, const alb_rgb *start, double residual, alb_error *error);
@@ -54,15 +55,18 @@ typedef struct alb_run {
     alb_radiosity_report *report;
 } alb_run;
 
-// One product: residual = b + K x - x, noted. True where the run is over: it is small enough, or products are spent.
+// One product: residual = b + K x - x, noted. True where the run is over: it is small enough or no number, or products
+// are spent.
 bool alb_run_residual(alb_run *run);
 // Sets the floor for x as it stands.
 void alb_run_find_floor(alb_run *run);
-// Largest of length[c] / scale[c].
+// Largest of length[c] / scale[c]; NAN where one is no number.
 double alb_run_worst(const alb_run *run, const double length[3]);
 // Counts a product and notes the residual after it.
 void alb_run_note(alb_run *run, double residual);
 bool alb_run_gmres(alb_run *run, alb_error *error);
-// ALB_INTERNAL with the numbers where neither the residual asked for nor the floor is reached.
+// ALB_INTERNAL with the numbers where neither the residual asked for nor the floor is reached; ALB_BAD_DATA where the
+// residual is no number, with the patch of the light (b, or the irradiance that it comes from; may be NULL) that is
+// none.
 bool alb_solver_check(const alb_radiosity_report *report, alb_solver solver, double residual, double floor,
-                      alb_error *error);
+                      const alb_rgb *light, size_t count, alb_error *error);

@@ -42,13 +42,16 @@ static void find_bounds(run *r)
     for (size_t p = 0; p < scatter->patch_count; p++)
         for (int c = 0; c < 3; c++)
             rows[c] = fmax(rows[c], scatter->row_sums[p][c]);
-    for (int c = 0; c < 3; c++)
-        r->bound[c] = r->squares[c] > 0 ? sqrt(rows[c] * r->space.total_mm2 / r->squares[c]) : 0;
+    for (int c = 0; c < 3; c++) {
+        const double square = isfinite(r->squares[c]) ? r->squares[c] : (double)NAN;
+        r->bound[c] = square == 0 ? 0 : sqrt(rows[c] * r->space.total_mm2 / square);
+    }
 }
 
 static double worst_of(const run *r, const double length[3])
 {
-    return fmax(r->bound[0] * length[0], fmax(r->bound[1] * length[1], r->bound[2] * length[2]));
+    return alb_rgb_largest(
+        (const double[3]){r->bound[0] * length[0], r->bound[1] * length[1], r->bound[2] * length[2]});
 }
 
 // Notes the rest after a product.
@@ -63,20 +66,17 @@ static void note(run *r)
     report->residual = report->history[report->iterations++] = worst_of(r, length);
 }
 
-// What the patches send out of E + g on each cluster, as S~ has it.
+// M + S~ (E + P g), from Q E + g in r->settled.
 static void send_roughly(alb_rgb *out, const run *r)
 {
     const alb_clusters *clusters = &r->equations->clusters;
+    alb_clusters_move(r->sent, clusters, (const alb_rgb *)r->settled, (const alb_rgb *)r->even);
 #pragma omp parallel for schedule(static)
-    for (size_t p = 0; p < clusters->patch_count; p++) {
-        const uint16_t k = clusters->cluster[p];
-        for (int c = 0; c < 3; c++) {
-            const double e = r->irradiance ? r->irradiance[p][c] : 0, m = r->exitance ? r->exitance[p][c] : 0,
-                         kept = clusters->kept[k][c];
-            const double share = kept > 0 ? r->sent[k][c] / kept : 0;
-            out[p][c] = m + clusters->sums[p][c] * (share + e - r->even[k][c]);
-        }
-    }
+    for (size_t p = 0; p < clusters->patch_count; p++)
+        for (int c = 0; c < 3; c++)
+            out[p][c] =
+                (r->exitance ? r->exitance[p][c] : 0) +
+                alb_clusters_sent(clusters, (const alb_rgb *)r->sent, p, c, r->irradiance ? r->irradiance[p][c] : 0);
 }
 
 // h from nothing, in r->light.
@@ -88,7 +88,6 @@ static void start_with_clusters(run *r)
     for (size_t k = 0; k < count; k++) // E + g
         for (int c = 0; c < 3; c++)
             settled[k][c] += even[k][c];
-    alb_clusters_scatter(sent, clusters, (const alb_rgb *)settled);
     send_roughly(r->rest, r);
     alb_form_factors_apply(r->light, r->equations->factors, (const alb_rgb *)r->rest);
     alb_clusters_average(sent, clusters, (const alb_rgb *)r->light);
@@ -141,25 +140,6 @@ static void settle(run *r)
     note(r);
 }
 
-// along[k] orthogonal to those before and one long, sends[k] with it.
-static void orthonormalise(run *r, int k)
-{
-    double dots[STEPS][3], length[3], factor[3];
-    for (int round = 0; k && round < 2; round++) {
-        alb_space_dots(dots, &r->space, (const alb_rgb *)r->along[k], r->along, k);
-        for (int i = 0; i < k; i++)
-            for (int c = 0; c < 3; c++)
-                dots[i][c] = -dots[i][c];
-        alb_space_add(NULL, &r->space, r->along[k], (const double(*)[3])dots, r->along, k);
-        alb_space_add(NULL, &r->space, r->sends[k], (const double(*)[3])dots, r->sends, k);
-    }
-    alb_space_norm(length, &r->space, (const alb_rgb *)r->along[k]);
-    for (int c = 0; c < 3; c++)
-        factor[c] = length[c] > 0 ? 1 / length[c] : 0;
-    alb_space_scale(&r->space, r->along[k], factor);
-    alb_space_scale(&r->space, r->sends[k], factor);
-}
-
 static bool step(run *r, int k, alb_error *error)
 {
     double factors[1][3];
@@ -174,7 +154,7 @@ static bool step(run *r, int k, alb_error *error)
     alb_form_factors_apply(r->along[k], r->equations->factors, (const alb_rgb *)r->sends[k]);
     alb_space_add(NULL, &r->space, r->light, minus_one, &r->along[k], 1);
     swap(&r->light, &r->along[k]);
-    orthonormalise(r, k);
+    alb_space_orthonormalise(&r->space, r->along, r->sends, k, 0);
     alb_space_dots(factors, &r->space, (const alb_rgb *)r->rest, &r->along[k], 1);
     alb_space_add(NULL, &r->space, r->radiosity, (const double(*)[3])factors, &r->sends[k], 1);
     for (int c = 0; c < 3; c++)
@@ -202,7 +182,7 @@ static bool iterate(run *r, double residual, alb_error *error)
             return true;
         alb_form_factors_apply(r->light, r->equations->factors, (const alb_rgb *)r->radiosity);
         settle(r);
-        if (report->residual <= residual || report->iterations >= ALB_PRODUCTS_MAX ||
+        if (!(report->residual > residual) || report->iterations >= ALB_PRODUCTS_MAX ||
             (report->residual <= r->floor && report->residual > 0.5 * first))
             return true;
     }
@@ -258,7 +238,7 @@ static bool solve(run *r, const alb_rgb *start, double residual, alb_error *erro
     if (!iterate(r, residual, error))
         return false;
     alb_space_mean(r->report->residual_flux, &r->space, (const alb_rgb *)r->rest);
-    return alb_solver_check(r->report, ALB_SOLVER_TWO_LEVEL, residual, r->floor, error);
+    return alb_solver_check(r->report, ALB_SOLVER_TWO_LEVEL, residual, r->floor, r->irradiance, n, error);
 }
 
 bool alb_two_level_run(alb_rgb *radiosity, alb_radiosity_report *report, const alb_radiosity *equations,

@@ -190,3 +190,28 @@ void alb_space_mean(double out[3], const alb_space *space, const alb_rgb *a)
         mean_block(space, block, 0, a);
     gather((double(*)[3])out, space, 1);
 }
+
+void alb_space_orthonormalise(const alb_space *space, alb_rgb *const *vectors, alb_rgb *const *images, int k,
+                              double least)
+{
+    double dots[ALB_SPACE_VECTORS][3], before[3] = {0}, length[3], factor[3];
+    if (least > 0)
+        alb_space_norm(before, space, (const alb_rgb *)vectors[k]);
+    for (int round = 0; round < 2; round++)
+        for (int first = 0; first < k; first += ALB_SPACE_VECTORS) {
+            const int count = k - first < ALB_SPACE_VECTORS ? k - first : ALB_SPACE_VECTORS;
+            alb_space_dots(dots, space, (const alb_rgb *)vectors[k], vectors + first, count);
+            for (int i = 0; i < count; i++)
+                for (int c = 0; c < 3; c++)
+                    dots[i][c] = -dots[i][c];
+            alb_space_add(NULL, space, vectors[k], (const double(*)[3])dots, vectors + first, count);
+            if (images)
+                alb_space_add(NULL, space, images[k], (const double(*)[3])dots, images + first, count);
+        }
+    alb_space_norm(length, space, (const alb_rgb *)vectors[k]);
+    for (int c = 0; c < 3; c++)
+        factor[c] = length[c] > least * before[c] ? 1 / length[c] : 0;
+    alb_space_scale(space, vectors[k], factor);
+    if (images)
+        alb_space_scale(space, images[k], factor);
+}

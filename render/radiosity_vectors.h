@@ -3,6 +3,7 @@
 // size, added in order.
 #pragma once
 #include "base/error.h"
+#include <math.h>
 #include <stddef.h>
 
 typedef double alb_rgb[3];
@@ -19,6 +20,16 @@ typedef struct alb_space {
 bool alb_space_create(alb_space *space, const double *areas_mm2, size_t count, alb_error *error);
 void alb_space_free(alb_space *space);
 
+// The largest channel, NAN where one is none: fmax would pass over it.
+static inline double alb_rgb_largest(const double values[3])
+{
+    double largest = values[0];
+    for (int c = 1; c < 3; c++)
+        if (!(values[c] <= largest) && !isnan(largest))
+            largest = values[c];
+    return largest;
+}
+
 // out[k] = <a, b_k> per channel, the mean over area.
 void alb_space_dots(double (*out)[3], const alb_space *space, const alb_rgb *a, alb_rgb *const *b, int count);
 // a += sum_k factors[k] b_k; norm (may be NULL) of the result.
@@ -33,3 +44,8 @@ void alb_space_residual(double norm[3], double mean[3], const alb_space *space, 
 void alb_space_norm(double out[3], const alb_space *space, const alb_rgb *a);
 void alb_space_weighted_norm(double out[3], const alb_space *space, const alb_rgb *a, const alb_rgb *weights);
 void alb_space_mean(double out[3], const alb_space *space, const alb_rgb *a);
+// Takes from vectors[k] what the orthonormal vectors[0 .. k) span, twice (Gram-Schmidt), and makes it one long; a
+// channel of which no more than the share `least` is left becomes zero. images (NULL: none): of the vectors under one
+// linear map, which they stay.
+void alb_space_orthonormalise(const alb_space *space, alb_rgb *const *vectors, alb_rgb *const *images, int k,
+                              double least);

@@ -92,17 +92,12 @@ static void bounce_coarsely(const alb_relight *r)
 static void send_roughly(const alb_relight *r, const alb_rgb *irradiance)
 {
     const alb_clusters *clusters = &r->equations->clusters;
-    alb_clusters_scatter(r->sent, clusters, (const alb_rgb *)r->bounced);
+    alb_clusters_move(r->sent, clusters, (const alb_rgb *)r->bounced, (const alb_rgb *)r->even);
 #pragma omp parallel for schedule(static)
-    for (size_t k = 0; k < clusters->count; k++) // as even light that sends it, less what is there
+    for (size_t p = 0; p < r->count; p++)
         for (int c = 0; c < 3; c++)
-            r->sent[k][c] = (clusters->kept[k][c] > 0 ? r->sent[k][c] / clusters->kept[k][c] : 0) - r->even[k][c];
-#pragma omp parallel for schedule(static)
-    for (size_t p = 0; p < r->count; p++) {
-        const double *moved = r->sent[clusters->cluster[p]];
-        for (int c = 0; c < 3; c++)
-            r->receivers.values[p][c] = (float)(clusters->sums[p][c] * (moved[c] + irradiance[p][c]));
-    }
+            r->receivers.values[p][c] =
+                (float)alb_clusters_sent(clusters, (const alb_rgb *)r->sent, p, c, irradiance[p][c]);
 }
 
 void alb_relight_apply(alb_rgb *radiosity, alb_relight *r, const alb_rgb *irradiance)

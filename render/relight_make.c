@@ -24,29 +24,6 @@ typedef struct maker {
 
 enum { LIGHT_KINDS = 4 };
 
-// Takes from column k what the columns before it span, twice (Gram-Schmidt), and makes it one long; a channel that
-// died out becomes zero.
-static void orthonormalise(const maker *m, int k)
-{
-    alb_rgb *column = m->basis[k];
-    double before[3], length[3], factor[3];
-    alb_space_norm(before, &m->space, (const alb_rgb *)column);
-    for (int round = 0; round < 2; round++)
-        for (int first = 0; first < k; first += ALB_SPACE_VECTORS) {
-            double dots[ALB_SPACE_VECTORS][3];
-            const int count = k - first < ALB_SPACE_VECTORS ? k - first : ALB_SPACE_VECTORS;
-            alb_space_dots(dots, &m->space, (const alb_rgb *)column, m->basis + first, count);
-            for (int i = 0; i < count; i++)
-                for (int c = 0; c < 3; c++)
-                    dots[i][c] = -dots[i][c];
-            alb_space_add(NULL, &m->space, column, (const double(*)[3])dots, m->basis + first, count);
-        }
-    alb_space_norm(length, &m->space, (const alb_rgb *)column);
-    for (int c = 0; c < 3; c++)
-        factor[c] = length[c] > 1e-8 * before[c] ? 1 / length[c] : 0;
-    alb_space_scale(&m->space, column, factor);
-}
-
 // A light at random, by turns one that shines on what lies about a random patch and faces its way, within a tenth to a
 // third of the scene; a point of light in front of it, without shadows; the sky, brighter from one side; and what a
 // lamp there, of the size of the spot, lights through the form factors, with shadows.
@@ -129,7 +106,7 @@ static bool find_range(maker *m, alb_error *error)
         alb_scatter_apply(m->basis[k], out->equations->scatter, (const alb_rgb *)m->light);
         alb_space_add(NULL, &m->space, m->solution, minus_one, &m->basis[k], 1);
         alb_form_factors_apply(m->basis[k], out->equations->factors, (const alb_rgb *)m->solution);
-        orthonormalise(m, k);
+        alb_space_orthonormalise(&m->space, m->basis, NULL, k, 1e-8);
         pack(m, out->u, out->u_step, k, (const alb_rgb *)m->basis[k], NULL);
     }
     return true;
@@ -156,7 +133,7 @@ static bool state_error(maker *m, alb_error *error)
     alb_relight *out = m->out;
     double squares[LIGHT_KINDS] = {0};
     for (int test = 0; test < TESTS; test++) {
-        double whole[3], off[3], worst = 0;
+        double whole[3], off[3], shares[3];
         alb_rgb *found = m->basis[0]; // its columns are packed
         random_light(m, FOR_TESTS, test);
         alb_scatter_use_links(out->equations->scatter, true);
@@ -168,7 +145,10 @@ static bool state_error(maker *m, alb_error *error)
         alb_space_norm(whole, &m->space, (const alb_rgb *)m->solution);
         alb_space_add(off, &m->space, found, minus_one, &m->solution, 1);
         for (int c = 0; c < 3; c++)
-            worst = whole[c] > 0 ? fmax(worst, 100 * off[c] / whole[c]) : worst;
+            shares[c] = whole[c] == 0 ? 0 : 100 * off[c] / whole[c];
+        const double worst = alb_rgb_largest(shares);
+        if (isnan(worst))
+            return alb_fail(error, ALB_INTERNAL, "relighting: what comes of test light %d is no number", test);
         squares[test % LIGHT_KINDS] += worst * worst * LIGHT_KINDS / TESTS;
         out->worst_percent = fmax(out->worst_percent, worst);
     }

@@ -1,6 +1,5 @@
 // Patches of a cluster, in the order of a space-filling curve, in groups of about four. Where the light that they get
-// from other patches differs over a group, each stands for itself. A group's list is drawn from those of its patches,
-// at equal steps through its area and through the sorted list of each.
+// from other patches differs over a group, each stands for itself. A group's list is drawn from those of its patches.
 //
 // Where it stops being true: light of other kinds than that which the groups were taken apart for may differ elsewhere,
 // such as that of a lamp in a corner that no light shone into.
@@ -90,26 +89,6 @@ static void make_receivers(alb_receivers *out, const group *groups, size_t count
                 out->first[++out->count] = groups[g].first + i + 1;
 }
 
-// The list of a receiver, from those of its patches.
-static void take_row(uint32_t *out, uint32_t length, const uint32_t *members, size_t count,
-                     const alb_form_factors *factors, uint32_t *row)
-{
-    double all = 0, before = 0;
-    uint32_t q = 0;
-    for (size_t i = 0; i < count; i++)
-        all += factors->areas_mm2[members[i]];
-    for (size_t i = 0; i < count; i++) {
-        const double area = factors->areas_mm2[members[i]], step = all / length,
-                     rays = alb_form_factors_rays(factors, members[i]);
-        alb_form_factors_row(row, factors, members[i]);
-        for (; q < length && ((q + 0.5) * step < before + area || i + 1 == count); q++) {
-            const double into = fmin(fmax(((q + 0.5) * step - before) / area, 0), 1);
-            out[q] = row[(size_t)fmin(into * rays, rays - 1)];
-        }
-        before += area;
-    }
-}
-
 static bool fill_rows(alb_receivers *out, const alb_form_factors *factors, alb_error *error)
 {
     const size_t n = factors->patch_count;
@@ -126,8 +105,8 @@ static bool fill_rows(alb_receivers *out, const alb_form_factors *factors, alb_e
     for (size_t chunk = 0; ok && chunk < out->rows.chunks; chunk++) {
         uint32_t *to = hits;
         for (size_t r = chunk * ALB_CHUNK_ROWS; r < out->count && r < (chunk + 1) * ALB_CHUNK_ROWS; to += lengths[r++])
-            take_row(to, lengths[r], out->members + out->first[r], out->first[r + 1] - out->first[r], factors,
-                     hits + largest);
+            alb_form_factors_group_row(to, lengths[r], factors, out->members + out->first[r],
+                                       out->first[r + 1] - out->first[r], hits + largest);
         alb_hit_rows_fill(&out->rows, chunk, hits, hits + largest);
     }
     if (ok)

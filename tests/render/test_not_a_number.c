@@ -1,5 +1,6 @@
 // What cannot be computed is refused or said, and never a picture: fmax and comparisons pass over numbers that are
 // none.
+#include "base/random.h"
 #include "check.h"
 #include "render/scatter_kernel.h"
 #include "render/shape.h"
@@ -62,6 +63,40 @@ static void a_row_sum_that_is_no_number_is_refused(void **state)
     }
 }
 
+// Light on one patch, or emitted by one, in one channel: no solver takes it for a solution.
+static void light_that_is_no_number_is_refused(void **state)
+{
+    (void)state;
+    alb_scene scene;
+    alb_light light;
+    alb_solution s;
+    alb_error error = {0};
+    alb_surface wall = {.name = "wall", .reflectance = {0.5, 0.5, 0.5}};
+    create_ball(&scene, &wall, &light, 16);
+    check_ok(alb_solution_create(&s, &scene, &error), &error);
+    const double values[3] = {(double)NAN, (double)INFINITY, 1e200}; // the last has no square
+    for (int trial = 0; trial < 60; trial++) {
+        alb_random random = alb_random_at(5, 0, (uint64_t)trial);
+        alb_radiosity_report report;
+        const size_t p = (size_t)(alb_random_uniform(&random) * (double)s.patches.count);
+        const int c = (int)(3 * alb_random_uniform(&random));
+        const bool emitted = trial & 1;
+        double *at = emitted ? &s.exitance[p][c] : &s.irradiance[p][c], kept = *at;
+        char named[64] = "no number";
+        *at = values[trial / 2 % 3];
+        if (!emitted && !isfinite(*at))
+            snprintf(named, sizeof named, "patch %zu, channel %c", p, "RGB"[c]);
+        error = (alb_error){0};
+        check_fails(alb_radiosity_solve(s.radiosity, &report, &s.equations, (alb_solver)(trial % ALB_SOLVERS),
+                                        (const alb_rgb *)s.irradiance, (const alb_rgb *)s.exitance, NULL, 1e-3, &error),
+                    &error, ALB_BAD_DATA, trial % ALB_SOLVERS == ALB_SOLVER_TWO_LEVEL ? named : "");
+        assert_in_range(report.iterations, 0, 5);
+        *at = kept;
+    }
+    alb_solution_free(&s);
+    alb_mesh_free(&scene.mesh);
+}
+
 // A single ray a patch has no halves that could differ: its error is unknown, not zero.
 static void one_ray_states_no_error(void **state)
 {
@@ -90,6 +125,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(faint_scattering_stays_finite),
         cmocka_unit_test(a_row_sum_that_is_no_number_is_refused),
+        cmocka_unit_test(light_that_is_no_number_is_refused),
         cmocka_unit_test(one_ray_states_no_error),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -367,6 +367,39 @@ static void empty(void **state)
     }
 }
 
+// A number that is none, anywhere in the light or in K and in one channel alone, is never taken for convergence: each
+// solver ends at once and says so.
+static void a_number_that_is_none_never_converges(void **state)
+{
+    (void)state;
+    static dense d;
+    for (uint64_t trial = 0; trial < 40; trial++)
+        for (int solver = 0; solver < ALB_SOLVER_TWO_LEVEL; solver++) {
+            alb_random random = alb_random_at(71, 0, trial);
+            alb_rgb light[N_MAX], found[N_MAX];
+            alb_error error = {0};
+            alb_radiosity_report report;
+            fill_random(&d, 5 + trial, 0.9, trial);
+            fill_light(light, d.n, trial);
+            const size_t i = (size_t)(alb_random_uniform(&random) * (double)d.n),
+                         j = (size_t)(alb_random_uniform(&random) * (double)d.n);
+            const int c = (int)(3 * alb_random_uniform(&random));
+            const double none = trial % 4 < 2 ? (double)NAN : (double)INFINITY;
+            char named[64] = "is not finite";
+            if (trial % 2) {
+                d.k[c][i][j] = none;
+            } else {
+                light[i][c] = none;
+                snprintf(named, sizeof named, "patch %zu, channel %c", i, "RGB"[c]);
+            }
+            const alb_bounce bounce = bounce_of(&d);
+            check_fails(
+                alb_solver_run(found, &report, (alb_solver)solver, &bounce, (const alb_rgb *)light, NULL, 1e-3, &error),
+                &error, ALB_BAD_DATA, named);
+            assert_in_range(report.iterations, 1, 5);
+        }
+}
+
 static void says_what_a_solver_lacks(void **state)
 {
     (void)state;
@@ -396,6 +429,7 @@ int main(void)
         cmocka_unit_test(albedo_to_one_closed),
         cmocka_unit_test(starts_cost_one_product_and_never_harm),
         cmocka_unit_test(empty),
+        cmocka_unit_test(a_number_that_is_none_never_converges),
         cmocka_unit_test(says_what_a_solver_lacks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
