@@ -45,6 +45,20 @@ void alb_light_sky(double radiance[3], const alb_light *light, alb_vector direct
     }
 }
 
+void alb_lights_sky(double radiosity[3], const alb_light *lights, size_t count)
+{
+    enum { DIRECTIONS = 256 };
+    radiosity[0] = radiosity[1] = radiosity[2] = 0;
+    for (size_t i = 0; i < count; i++)
+        for (int k = 0; k < DIRECTIONS && lights[i].kind == ALB_LIGHT_ENVIRONMENT; k++) {
+            double radiance[3];
+            const double y = 1 - (2 * k + 1.0) / DIRECTIONS, side = sqrt(1 - y * y), angle = 2.399963229728653 * k;
+            alb_light_sky(radiance, &lights[i], (alb_vector){side * cos(angle), y, side * sin(angle)});
+            for (int c = 0; c < 3; c++)
+                radiosity[c] += M_PI * radiance[c] / DIRECTIONS;
+        }
+}
+
 static bool add_environment(double (*irradiance)[3], const alb_light *light, const alb_patches *patches,
                             const alb_form_factors *factors, alb_error *error)
 {

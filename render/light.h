@@ -31,6 +31,9 @@ typedef struct alb_light {
 void alb_light_free(alb_light *light);
 // Radiance of the environment from the direction (unit); zero for other kinds.
 void alb_light_sky(double radiance[3], const alb_light *light, alb_vector direction);
+// Radiosity of an even sky as bright as that of all the lights, RGB: pi times their mean radiance, over 256 directions
+// spread evenly; zero without an environment.
+void alb_lights_sky(double radiosity[3], const alb_light *lights, size_t count);
 // Adds the light's irradiance to each patch (patch_count rows). Point: 16 points a patch, shadow-tested where the
 // outermost four do not agree. Spot and projector: about a million stratified rays that carry flux/N each to the patch
 // they meet, so that flux is conserved exactly. Environment: the sky rays of the form factors. `seed` and `stream` pick

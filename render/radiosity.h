@@ -16,10 +16,12 @@ typedef struct alb_radiosity {
     uint32_t *row;                 // scratch: the longest row of the form factors
 } alb_radiosity;
 
+// Everything is borrowed for the life of the equations; clusters are made of it. The row sums of the scattering are
+// known. ALB_NO_MEMORY, *equations then empty.
 bool alb_radiosity_create(alb_radiosity *equations, const alb_patches *patches, const alb_scatter *scatter,
                           const alb_form_factors *factors, alb_error *error);
 void alb_radiosity_free(alb_radiosity *equations);
-// After the scattering was rewritten.
+// After the scattering was rewritten: takes its row sums, known or estimated.
 void alb_radiosity_refresh(alb_radiosity *equations);
 size_t alb_radiosity_bytes(const alb_radiosity *equations);
 
@@ -32,7 +34,8 @@ bool alb_radiosity_check(double *largest, const alb_scatter *scatter, bool close
 alb_bounce alb_radiosity_bounce(alb_radiosity *equations);
 
 // Solves to the relative residual from the guess `start` (NULL: none). irradiance E: direct light; exitance M: emitted;
-// NULL: nothing. All arrays have a row for each patch. Fails as alb_solver_run does. Call alb_radiosity_check first.
+// NULL: nothing. All arrays have a row for each patch, RGB per area. Fails as alb_solver_run does. Call
+// alb_radiosity_check first.
 bool alb_radiosity_solve(alb_rgb *radiosity, alb_radiosity_report *report, alb_radiosity *equations, alb_solver solver,
                          const alb_rgb *irradiance, const alb_rgb *exitance, const alb_rgb *start, double residual,
                          alb_error *error);

@@ -22,8 +22,9 @@ typedef struct alb_clusters {
 
 enum { ALB_CLUSTER_RAYS = 256, ALB_CLUSTER_SOURCES = 32 };
 
-// About 16 patches each, fewer in narrow gaps, of one material and one main direction. row: scratch for the longest row
-// of the factors.
+// About 16 patches each, fewer in narrow gaps, of one material and one main direction. factors are read, not kept;
+// patches lend their areas, the scattering its row sums. row: scratch for the longest row of the factors.
+// ALB_NO_MEMORY, *clusters then empty.
 bool alb_clusters_create(alb_clusters *clusters, const alb_patches *patches, const alb_form_factors *factors,
                          const alb_scatter *scatter, uint32_t *row, alb_error *error);
 void alb_clusters_free(alb_clusters *clusters);

@@ -17,6 +17,7 @@ typedef struct alb_space {
     double (*partial)[ALB_SPACE_VECTORS][3]; // scratch: of each block
 } alb_space;
 
+// Vectors of `count` patches. Fails for want of memory alone.
 bool alb_space_create(alb_space *space, const double *areas_mm2, size_t count, alb_error *error);
 void alb_space_free(alb_space *space);
 
@@ -35,7 +36,7 @@ void alb_space_dots(double (*out)[3], const alb_space *space, const alb_rgb *a, 
 // a += sum_k factors[k] b_k; norm (may be NULL) of the result.
 void alb_space_add(double norm[3], const alb_space *space, alb_rgb *a, const double (*factors)[3], alb_rgb *const *b,
                    int count);
-// a *= factor.
+// a *= factor, channel by channel.
 void alb_space_scale(const alb_space *space, alb_rgb *a, const double factor[3]);
 // r = right + r - x, with its norm and its mean absolute value: the residual from r = K x.
 void alb_space_residual(double norm[3], double mean[3], const alb_space *space, alb_rgb *r, const alb_rgb *right,

@@ -27,8 +27,8 @@ typedef struct alb_scatter_node {
 
 typedef struct alb_tree {
     uint32_t body, first_cluster, first_leaf, leaf_count;
-    uint16_t surface;
-    uint8_t face;
+    uint16_t surface;     // what the body is made of
+    uint8_t face;         // ALB_FACE_...
     float axis[3];        // slab: normal of its faces; of a sheet zero
     alb_vector middle_mm; // of the body
 } alb_tree;
@@ -53,13 +53,16 @@ static inline uint32_t alb_left_count(uint32_t count)
     return count <= ALB_BLOCK ? count / 2 : (count / 2 + ALB_BLOCK - 1) / ALB_BLOCK * ALB_BLOCK;
 }
 
-// paths: of each body, which tell the faces of sheets.
+// Trees of all bodies, patches of one face of one body each (scatter_forest.c). materials[patch] indexes surfaces;
+// paths[body] tell the faces of sheets. All is read, nothing kept. ALB_NO_MEMORY, *forest then empty.
 bool alb_forest_create(alb_forest *forest, const alb_bodies *bodies, const alb_patches *patches,
                        const uint16_t *materials, const alb_surface *surfaces, const alb_optical_paths *paths,
                        alb_error *error);
 void alb_forest_free(alb_forest *forest);
-// Covariance of a point of the triangle, in the order of alb_cluster.
+// Covariance of a point of the triangle, mm^2, in the order of alb_cluster.
 void alb_moments_of_triangle(float moments[6], alb_vector a, alb_vector b, alb_vector c);
-// Fills lights and nodes from the irradiance of the patches; NULL: one everywhere.
+// Fills lights and nodes from irradiance[patch], RGB; NULL: one everywhere (formula: scatter_gather.c). The same bytes
+// with any number of threads.
 void alb_forest_gather(alb_forest *forest, const double (*irradiance)[3]);
+// Everything that stays allocated.
 size_t alb_forest_bytes(const alb_forest *forest);

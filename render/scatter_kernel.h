@@ -15,7 +15,7 @@ typedef struct alb_scatter_kernel {
     alb_side side;
     int first_octave, octave_count, first_used; // tables begin at first_used
     float largest_spread_mm2;                   // of a patch
-    // [octave - first_used][code], of R, G, B and a zero: s(d), and then s' / s and s'' / 2 s
+    // [octave - first_used][code], of R, G, B and a zero: s(d), 1/mm^2, and then s' / s, 1/mm, and s'' / 2 s, 1/mm^2
     float (*values)[4], (*bends)[8];
     // P(r) / r of R, G, B, P(r) = integral_0^r s r dr, at r = (knot / ALB_DISC_KNOTS)^2 near_mm
     double near_mm;
@@ -31,17 +31,22 @@ typedef struct alb_scatter_kernel_needs {
     float leans[ALB_KERNEL_BINS];     // s'' / 2 s', 1/mm, of the channels' sum, each over its total
 } alb_scatter_kernel_needs;
 
-// For distances up to reach_mm, in exact rules up to near_mm.
+// Sets the octaves for distances up to reach_mm, and how far exact rules go, near_mm; no tables yet.
 void alb_scatter_kernel_span(alb_scatter_kernel *kernel, double reach_mm, double near_mm);
-// Tables from octave first_used on.
+// Allocates the tables, zero, from octave first_used on. ALB_NO_MEMORY, the kernel then empty.
 bool alb_scatter_kernel_create(alb_scatter_kernel *kernel, int first_used, alb_error *error);
 void alb_scatter_kernel_free(alb_scatter_kernel *kernel);
-// Fills the tables.
+// Fills the tables from the profiles of R, G and B, 1/mm^2 (formulas: scatter_kernel.c). Where a profile is infinite at
+// distance zero its mean over half a code stands there.
 void alb_scatter_kernel_write(alb_scatter_kernel *kernel, const alb_profile profiles[3]);
+// Of the tables.
 size_t alb_scatter_kernel_bytes(const alb_scatter_kernel *kernel);
 
+// What the profiles ask for at the kernel's distances; `links`: how many links a row may have on an infinite plane
+// (formula: scatter_kernel.c).
 void alb_scatter_kernel_needs_find(alb_scatter_kernel_needs *needs, const alb_scatter_kernel *kernel,
                                    const alb_profile profiles[3], double links);
+// The bin of a distance; those beyond the first or the last are taken there.
 static inline int alb_scatter_kernel_bin(const alb_scatter_kernel_needs *needs, float r_mm)
 {
     union {

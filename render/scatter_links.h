@@ -79,8 +79,10 @@ typedef struct alb_body_kernels {
     uint16_t index[ALB_SIDES];
 } alb_body_kernels;
 
-// needs: of each kernel; paths: of each body, all zero where segments stay inside; error_wanted: of a row's sum, for
-// the parts of near patches.
+// Links of all blocks of the forest (how they are chosen: scatter_links.c). of_bodies[body] index kernels,
+// needs[kernel]; paths[body], all zero where segments stay inside; error_wanted, relative: of a row's sum, for the
+// parts of near patches. Exact pairs have no weights yet (alb_product_write_pairs). All is read, nothing kept.
+// ALB_NO_MEMORY, *links then empty. The same bytes with any number of threads.
 bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patches *patches,
                       const alb_body_kernels *of_bodies, const alb_scatter_kernel *kernels,
                       const alb_scatter_kernel_needs *needs, const alb_optical_paths *paths, double error_wanted,

@@ -11,6 +11,7 @@ typedef struct alb_rule {
     int16_t weights[ALB_RULE_NODES];
 } alb_rule;
 
-// No corner of the triangle is further from p than near_mm.
+// The rule of the triangle about p, which no corner is further from than near_mm (formula: scatter_rule.c).
 void alb_rule_find(alb_rule *rule, const alb_vector triangle[3], alb_vector p, double near_mm);
+// integral: of the kernel's profiles over the triangle, RGB, no unit; not below zero.
 void alb_rule_apply(double integral[3], const alb_rule *rule, const alb_scatter_kernel *kernel);

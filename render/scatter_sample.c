@@ -4,6 +4,7 @@
 // has come. Weights are those of the clusters' centres: what their moments add is left out.
 #include "render/scatter_sample.h"
 #include "base/memory.h"
+#include "render/scatter_run.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -61,20 +62,19 @@ static inline void add_source(row *to, float weight, const extent *of, const uin
 static void add_links(row rows[ALB_BLOCK], int channel, const alb_link_block *block, const alb_forest *forest,
                       const alb_scatter_kernel *kernels, const extent *extents)
 {
-    const uint16_t *delta = block->deltas;
-    const uint8_t *code = block->codes;
-    for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; run++) {
-        const alb_scatter_kernel *kernel = &kernels[run->kernel];
-        const float(*table)[4] = (const float(*)[4])kernel->values + (run->octave - kernel->first_used) * ALB_CODES;
-        uint32_t source = run->first;
-        for (uint32_t k = 0; k < run->count; k++) {
-            source += *delta++;
-            code += alb_link_bend_bytes(run->kind);
-            const extent from = run->kind <= ALB_LINK_NEAR_NODE ? extents[source] : extent_of_leaf(forest, source);
-            for (int share = 0; share < alb_link_codes(run->kind); share++)
+    alb_run_reader at = alb_run_begin(block, forest);
+    for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; alb_run_pass(&at), run++) {
+        alb_run_take(&at, run, kernels);
+        const uint8_t *code = at.codes;
+        uint32_t source = at.first;
+        for (size_t k = 0; k < at.count; k++) {
+            source += at.deltas[k];
+            code += alb_link_bend_bytes(at.kind);
+            const extent from = at.kind <= ALB_LINK_NEAR_NODE ? extents[source] : extent_of_leaf(forest, source);
+            for (int share = 0; share < alb_link_codes(at.kind); share++)
                 for (uint32_t r = 0; r < ALB_BLOCK; r++, code++)
                     if (*code != ALB_NO_LINK)
-                        add_source(&rows[r], table[*code][channel] * from.area_mm2 * alb_link_share(run->kind, share),
+                        add_source(&rows[r], at.values[*code][channel] * from.area_mm2 * alb_link_share(at.kind, share),
                                    &from, forest->patches);
         }
     }

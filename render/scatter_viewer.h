@@ -53,7 +53,8 @@ static inline bool alb_viewer_in_sheet(const alb_viewer *v) { return v->paths->k
 void alb_project(float v[3], float x, float y, float z);
 // Lateral to the row's axis.
 void alb_viewer_project(float to[3], const alb_viewer *v, uint32_t row);
-// Mean distances from the rows to the source, and its variances along the lines of sight; across: lateral to the axis.
+// Mean distances from the rows to the source, mm, and its variances along the lines of sight; across: lateral to the
+// axis (formulas of distances: scatter_distance.c).
 void alb_viewer_measure(float distances[ALB_BLOCK], float along_mm2[ALB_BLOCK], const alb_viewer *v,
                         const alb_source *from, bool across);
 // Distances from the rows to the source, as many as the kind has codes; straight.

@@ -37,8 +37,8 @@ typedef struct alb_weights {
     float (*lights)[4]; // of clusters, patches too: mean irradiance of R, G and B; workspace of a product
 } alb_weights;
 
-// From the links and kernels as they are. row_sums and local: of the patches. error_wanted: see
-// alb_scatter_keep_weights.
+// From the links and kernels as they are (how: scatter_weights_make.c). row_sums[patch] and local[patch] of S';
+// error_wanted: see alb_scatter_keep_weights. All is read, nothing kept. ALB_NO_MEMORY, *weights then empty.
 bool alb_weights_create(alb_weights *weights, const alb_links *links, const alb_forest *forest,
                         const alb_scatter_kernel *kernels, const double (*row_sums)[3], const double (*local)[3],
                         double error_wanted, alb_error *error);
@@ -48,7 +48,8 @@ size_t alb_weights_bytes(const alb_weights *weights, const alb_forest *forest);
 // patches that are in no tree stay. The same bytes with any number of threads.
 void alb_weights_apply(double (*out)[3], const alb_weights *weights, const alb_forest *forest, const double (*local)[3],
                        const double (*irradiance)[3]);
-// The largest error of products with the weights against those with the links, over lights around random patches.
+// The largest error of products with the weights against those with the links, over lights around random patches, per
+// cent (formula: scatter_weights_error.c). Overwrites the forest's light. ALB_NO_MEMORY.
 bool alb_weights_error(double *percent, const alb_weights *weights, const alb_links *links, alb_forest *forest,
                        const alb_scatter_kernel *kernels, const double (*local)[3], size_t patch_count,
                        alb_error *error);

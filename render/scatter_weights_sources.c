@@ -9,6 +9,7 @@
 #include "render/scatter_weights_sources.h"
 #include "base/memory.h"
 #include "render/scatter_block.h"
+#include "render/scatter_run.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -20,59 +21,45 @@ alb_weight_source *alb_weight_sources_add(alb_weight_maker *m, alb_weight_source
 
 // ---- Links as sources ----
 
-// What the extent of a node adds, as the product takes it.
-static float by_extent(float bend, float spread)
+// Link k of the run: codes of the rows, and before them the one that all rows share.
+static void take_link(alb_weight_source *to, const alb_run_reader *run, size_t k, uint32_t at)
 {
-    const float second = bend * spread;
-    return second + 0.4F * second * second;
-}
-
-// One link: codes of the rows, and before them the one that all rows share.
-static void take_link(alb_weight_source *to, int kind, const uint8_t *codes, const int8_t direction[4], float spread,
-                      const float (*values)[4], const float (*bends)[8])
-{
-    const float *bend = bends[*codes];
-    const bool even = kind == ALB_LINK_NODE || kind == ALB_LINK_PATCH,
-               near = kind == ALB_LINK_NEAR_NODE || kind == ALB_LINK_NEAR_PATCH, node = kind <= ALB_LINK_NEAR_NODE;
-    codes += alb_link_bend_bytes(kind);
-    if (node)
-        spread *= (float)direction[3] / 64;
-    for (int share = 0; share < alb_link_codes(kind); share++)
+    const uint8_t *codes = run->codes + k * alb_link_code_bytes(run->kind);
+    const float *bend = run->bends[*codes];
+    const bool near = run->kind == ALB_LINK_NEAR_NODE || run->kind == ALB_LINK_NEAR_PATCH,
+               node = run->kind <= ALB_LINK_NEAR_NODE;
+    const float spread =
+        node ? run->forest->nodes[at].light[3] * ((float)run->directions[k][3] / 64) : run->forest->lights[at][3];
+    const alb_float4 none = {0}, even = run->kind > ALB_LINK_NEAR_PATCH ? none
+                                        : node                          ? alb_by_extent(bend, spread)
+                                                                        : alb_load4(bend + 4) * spread;
+    codes += alb_link_bend_bytes(run->kind);
+    for (int share = 0; share < alb_link_codes(run->kind); share++)
         for (int row = 0; row < ALB_BLOCK; row++, codes++)
             for (int c = 0; c < 3; c++) {
-                const float second = near   ? bends[*codes][4 + c] * spread
-                                     : node ? by_extent(bend[4 + c], spread)
-                                     : even ? bend[4 + c] * spread
-                                            : 0;
-                to->weights[c][row] += to->of.area_mm2 * values[*codes][c] * alb_link_share(kind, share) * (1 + second);
+                const float second = near ? run->bends[*codes][4 + c] * spread : even[c];
+                to->weights[c][row] +=
+                    to->of.area_mm2 * run->values[*codes][c] * alb_link_share(run->kind, share) * (1 + second);
             }
     for (int c = 0; node && c < 3; c++)
         for (int axis = 0; axis < 3; axis++)
-            to->slopes[c][axis] = bend[c] * (float)direction[axis] / INT8_MAX;
+            to->slopes[c][axis] = bend[c] * (float)run->directions[k][axis] / INT8_MAX;
 }
 
 static void take_block(alb_weight_maker *m, const alb_link_block *block)
 {
-    const alb_forest *forest = m->forest;
-    const uint16_t *delta = block->deltas;
-    const uint8_t *codes = block->codes;
-    const int8_t(*direction)[4] = (const int8_t(*)[4])block->directions;
+    alb_run_reader run = alb_run_begin(block, m->forest);
     m->found.count = m->kept.count = 0;
-    for (const alb_link_run *run = block->runs; run < block->runs + block->run_count; run++) {
-        const alb_scatter_kernel *kernel = &m->kernels[run->kernel];
-        const size_t octave = (size_t)(run->octave - kernel->first_used) * ALB_CODES;
-        const bool node = run->kind <= ALB_LINK_NEAR_NODE;
-        uint32_t at = run->first;
-        for (uint32_t k = 0; k < run->count; k++, codes += alb_link_code_bytes(run->kind)) {
-            at += *delta++;
+    for (uint32_t r = 0; r < block->run_count; alb_run_pass(&run), r++) {
+        alb_run_take(&run, &block->runs[r], m->kernels);
+        uint32_t at = run.first;
+        for (size_t k = 0; k < run.count; k++) {
+            at += run.deltas[k];
             alb_weight_source *to = alb_weight_sources_add(m, &m->found);
             if (!to)
                 return;
-            *to = alb_weight_source_of(m, node ? m->of_nodes[at] : m->of_leaves[at]);
-            take_link(to, run->kind, codes, node ? *direction : NULL,
-                      node ? forest->nodes[at].light[3] : forest->lights[at][3],
-                      (const float(*)[4])kernel->values + octave, (const float(*)[8])kernel->bends + octave);
-            direction += node;
+            *to = alb_weight_source_of(m, run.kind <= ALB_LINK_NEAR_NODE ? m->of_nodes[at] : m->of_leaves[at]);
+            take_link(to, &run, k, at);
         }
     }
     for (const alb_exact_pair *pair = block->pairs; pair < block->pairs + block->pair_count; pair++) {

@@ -1,8 +1,5 @@
 // The order of the steps, timed. Small lamps light the scene directly (lamp.h): their light is then part of E, M is
-// left out of the solution and of the balance, and is added to B at the end. Balance, H = E + F B the whole irradiance,
-// kappa the column sums of S':
-//     in = sum A (E + M),  absorbed = sum A (1 - kappa) H,  escaped = sum A B (share of sky rays), lost likewise for
-//     backs
+// left out of the solution and of the balance, and is added to B at the end.
 // What changed and what stays: rays know the meshes alone, scattering the meshes and materials, the solve everything.
 // A solution that is already there is the start of the next where the direct light has changed by so little that
 // clusters would come no nearer.
@@ -11,6 +8,7 @@
 #include "base/progress.h"
 #include "render/lamp.h"
 #include "render/patch_cull.h"
+#include "render/solution_account.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,13 +16,6 @@ const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "ligh
 
 // A change of the direct light, |E - E'| / |E|, below which the last solution is the better start.
 static const double small_change = 0.005;
-
-// Asked of scattering, relative, of what even light sends out: half of what is asked of all between 0.2 and 1 percent.
-// No more, so that coarse links make no energy; no less, for their memory.
-static double scatter_error(const alb_scene *scene)
-{
-    return 0.005 * (scene->error_percent > 0 ? fmin(fmax(scene->error_percent, 0.2), 1) : 1);
-}
 
 static const alb_solver default_solver = ALB_SOLVER_TWO_LEVEL;
 
@@ -69,57 +60,11 @@ static bool check_scattering(alb_solution *s, const alb_scene *scene, alb_error 
 
 static bool scatter_patches(alb_solution *s, const alb_scene *scene, alb_error *error)
 {
-    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces, scatter_error(scene), error))
+    if (!alb_scatter_create(&s->scatter, &s->patches, scene->mesh.groups, scene->surfaces,
+                            alb_solution_scatter_error(scene), error))
         return false;
     s->bytes[ALB_STAGE_SCATTERING] = alb_scatter_bytes(&s->scatter);
     return check_scattering(s, scene, error);
-}
-
-static void take_balance(alb_solution *s, const double (*irradiance)[3])
-{
-    const double(*kept)[3] = (const double(*)[3])s->scatter.column_sums;
-    s->balance = (alb_balance){0};
-    s->column_sum = 0;
-    for (size_t p = 0; p < s->patches.count; p++)
-        for (int c = 0; c < 3; c++) {
-            const double area = s->patches.areas_mm2[p];
-            s->column_sum = fmax(s->column_sum, kept[p][c]);
-            s->balance.in[c] += area * (s->irradiance[p][c] + (s->lamps_direct ? 0 : s->exitance[p][c]));
-            s->balance.absorbed[c] += area * (1 - kept[p][c]) * irradiance[p][c];
-            s->balance.escaped[c] += area * s->radiosity[p][c] * alb_form_factors_sky_share(&s->factors, p);
-            s->balance.lost[c] += area * s->radiosity[p][c] * alb_form_factors_back_share(&s->factors, p);
-        }
-}
-
-// What leaves a smooth slab on the far side leaves in other directions than what is reflected.
-static bool take_across(alb_solution *s, const alb_scene *scene, const double (*irradiance)[3], alb_error *error)
-{
-    bool wanted = false;
-    for (size_t i = 0; i < scene->surface_count; i++)
-        wanted |= scene->surfaces[i].slab && scene->surfaces[i].exits[ALB_TRANSMISSION].smooth;
-    free(s->across);
-    s->across = NULL;
-    if (wanted && !(s->across = alb_allocate(s->patches.count, sizeof *s->across, error)))
-        return false;
-    if (wanted)
-        alb_scatter_apply_across(s->across, &s->scatter, irradiance);
-    return true;
-}
-
-// What the whole irradiance H = E + F B says.
-static bool take_irradiance(alb_solution *s, const alb_scene *scene, alb_error *error)
-{
-    double(*irradiance)[3] = alb_allocate(s->patches.count, sizeof *irradiance, error);
-    if (!irradiance)
-        return false;
-    alb_form_factors_apply(irradiance, &s->factors, (const double(*)[3])s->radiosity);
-    for (size_t p = 0; p < s->patches.count; p++)
-        for (int c = 0; c < 3; c++)
-            irradiance[p][c] += s->irradiance[p][c];
-    take_balance(s, (const double(*)[3])irradiance);
-    const bool ok = take_across(s, scene, (const double(*)[3])irradiance, error);
-    free(irradiance);
-    return ok;
 }
 
 // From the radiosity as it stands where it is a start; small lamps are added to it at the end.
@@ -146,37 +91,6 @@ static void add_lamps(alb_solution *s, double sign)
             s->radiosity[p][c] += sign * s->exitance[p][c];
 }
 
-// Radiosity of an even sky as bright as the scene's: pi times its mean radiance.
-static void sky_radiosity(double sky[3], const alb_scene *scene)
-{
-    enum { DIRECTIONS = 256 };
-    sky[0] = sky[1] = sky[2] = 0;
-    for (size_t i = 0; i < scene->light_count; i++)
-        for (int k = 0; k < DIRECTIONS && scene->lights[i].kind == ALB_LIGHT_ENVIRONMENT; k++) {
-            double radiance[3];
-            const double y = 1 - (2 * k + 1.0) / DIRECTIONS, side = sqrt(1 - y * y), angle = 2.399963229728653 * k;
-            alb_light_sky(radiance, &scene->lights[i], (alb_vector){side * cos(angle), y, side * sin(angle)});
-            for (int c = 0; c < 3; c++)
-                sky[c] += M_PI * radiance[c] / DIRECTIONS;
-        }
-}
-
-// Accounts of a solution: what it may lack, and where the light goes.
-static bool take_stock(alb_solution *s, const alb_scene *scene, alb_error *error)
-{
-    double sky[3];
-    if (!alb_scatter_sum_columns(&s->scatter, error))
-        return false;
-    sky_radiosity(sky, scene);
-    s->bound = alb_radiosity_bound(&s->equations, &s->report, (const double(*)[3])s->radiosity);
-    if (!alb_form_factors_error(&s->rays_error_percent, &s->irradiance_error_percent, &s->factors,
-                                (const double(*)[3])s->radiosity, (const double(*)[3])s->irradiance, sky, error))
-        return false;
-    const double scattered_percent = s->scatter.body_count ? 100 * scatter_error(scene) : 0;
-    s->stated_error_percent = hypot(s->irradiance_error_percent, scattered_percent) + 100 * s->bound;
-    return take_irradiance(s, scene, error);
-}
-
 // Casts more rays where the first solution asks for them, and solves again from it. The time counts as that of the
 // rays.
 static bool refine_rays(alb_solution *s, const alb_scene *scene, alb_error *error)
@@ -184,7 +98,7 @@ static bool refine_rays(alb_solution *s, const alb_scene *scene, alb_error *erro
     double sky[3];
     const double start_s = alb_clock_s();
     const size_t rays = alb_hit_rows_rays(&s->factors.rows);
-    sky_radiosity(sky, scene);
+    alb_lights_sky(sky, scene->lights, scene->light_count);
     const bool ok =
         alb_form_factors_refine(NULL, &s->factors, &s->patches, &s->tracer, (const double(*)[3])s->radiosity, sky,
                                 scene->error_percent, ALB_RAYS_REFINED_MAX, error);
@@ -203,7 +117,7 @@ static bool first_solve(alb_solution *s, const alb_scene *scene, alb_error *erro
 {
     if (!alb_radiosity_create(&s->equations, &s->patches, &s->scatter, &s->factors, error) ||
         !solve(s, scene, false, error) || (scene->error_percent > 0 && !refine_rays(s, scene, error)) ||
-        !take_stock(s, scene, error))
+        !alb_solution_account(s, scene, error))
         return false;
     s->bytes[ALB_STAGE_SOLVE] = alb_radiosity_bytes(&s->equations) + 24 * s->patches.count * sizeof *s->radiosity;
     add_lamps(s, 1);
@@ -235,7 +149,7 @@ static bool relight(alb_solution *s, const alb_scene *scene, bool same, alb_erro
     bool ok = light_patches(s, scene, error);
     const double lit_s = alb_clock_s();
     const bool near = same && change_of(s, (const double(*)[3])before) < small_change * small_change;
-    ok = ok && solve(s, scene, near, error) && take_stock(s, scene, error);
+    ok = ok && solve(s, scene, near, error) && alb_solution_account(s, scene, error);
     add_lamps(s, ok ? 1 : 0);
     s->seconds[ALB_STAGE_LIGHTS] = lit_s - start_s;
     s->seconds[ALB_STAGE_SOLVE] = alb_clock_s() - lit_s;
