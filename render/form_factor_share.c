@@ -13,6 +13,7 @@
 #include "render/form_factor_share.h"
 #include "base/memory.h"
 #include "render/form_factor_cast.h"
+#include "render/mesh_edges.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,31 +21,6 @@
 static const double unlike = 0.12;
 
 typedef float float4 __attribute__((vector_size(16), may_alias));
-
-typedef struct side {
-    uint64_t edge; // lower vertex, higher vertex
-    uint32_t patch, corner;
-} side;
-
-static int by_edge(const void *a, const void *b)
-{
-    const side *p = a, *q = b;
-    if (p->edge != q->edge)
-        return p->edge < q->edge ? -1 : 1;
-    return p->patch < q->patch ? -1 : p->patch > q->patch;
-}
-
-static side *sorted_sides(const alb_patches *patches, alb_error *error)
-{
-    side *sides = alb_allocate(3 * patches->count, sizeof *sides, error);
-    for (size_t i = 0; sides && i < 3 * patches->count; i++) {
-        const uint32_t *face = patches->mesh->faces[i / 3], a = face[i % 3], b = face[(i + 1) % 3];
-        sides[i] = (side){(uint64_t)(a < b ? a : b) << 32 | (a < b ? b : a), (uint32_t)(i / 3), (uint32_t)(i % 3)};
-    }
-    if (sides)
-        qsort(sides, 3 * patches->count, sizeof *sides, by_edge);
-    return sides;
-}
 
 static double bend_of(const alb_patches *patches, uint32_t p, uint32_t q)
 {
@@ -54,21 +30,20 @@ static double bend_of(const alb_patches *patches, uint32_t p, uint32_t q)
 bool alb_row_shares_create(alb_row_shares *shares, const alb_patches *patches, alb_error *error)
 {
     const size_t n = patches->count;
-    side *sides = sorted_sides(patches, error);
+    alb_half_edge *edges = alb_half_edges_sorted((const uint32_t(*)[3])patches->mesh->faces, NULL, n, error);
     *shares = (alb_row_shares){.count = n};
-    const bool ok = sides && (shares->neighbours = alb_allocate(n, sizeof *shares->neighbours, error));
+    const bool ok = edges && (shares->neighbours = alb_allocate(n, sizeof *shares->neighbours, error));
     for (size_t i = 0; ok && i < 3 * n; i++)
         shares->neighbours[i / 3][i % 3] = (uint32_t)(i / 3);
     for (size_t i = 0, next; ok && i < 3 * n; i = next) {
-        for (next = i + 1; next < 3 * n && sides[next].edge == sides[i].edge;)
-            next++;
-        const uint32_t p = sides[i].patch, q = sides[next - 1].patch;
+        next = alb_half_edges_end(edges, 3 * n, i);
+        const uint32_t a = edges[i].place, b = edges[next - 1].place, p = a / 3, q = b / 3;
         if (next - i == 2 && p != q && bend_of(patches, p, q) < unlike) {
-            shares->neighbours[p][sides[i].corner] = q;
-            shares->neighbours[q][sides[i + 1].corner] = p;
+            shares->neighbours[p][a % 3] = q;
+            shares->neighbours[q][b % 3] = p;
         }
     }
-    free(sides);
+    free(edges);
     if (!ok)
         alb_row_shares_free(shares);
     return ok;

@@ -4,12 +4,8 @@
 // the component has no two sides and is left.
 #include "render/mesh_orient.h"
 #include "base/memory.h"
+#include "render/mesh_edges.h"
 #include <stdlib.h>
-
-typedef struct half_edge {
-    uint32_t low, high, face;
-    bool forward; // runs from low to high
-} half_edge;
 
 typedef struct link {
     uint32_t face;
@@ -17,16 +13,6 @@ typedef struct link {
 } link; // 3 a face; face UINT32_MAX: none
 
 enum { UNSEEN, WITH, AGAINST };
-
-static int by_edge(const void *a, const void *b)
-{
-    const half_edge *p = a, *q = b;
-    if (p->low != q->low)
-        return p->low < q->low ? -1 : 1;
-    if (p->high != q->high)
-        return p->high < q->high ? -1 : 1;
-    return p->face < q->face ? -1 : p->face > q->face;
-}
 
 static void put_link(link *links, uint32_t from, uint32_t to, bool against)
 {
@@ -37,23 +23,19 @@ static void put_link(link *links, uint32_t from, uint32_t to, bool against)
         }
 }
 
-static void find_links(link *links, half_edge *edges, const alb_mesh *mesh)
+static void find_links(link *links, const alb_half_edge *edges, const alb_mesh *mesh)
 {
     const size_t count = 3 * mesh->face_count;
-    for (size_t i = 0; i < count; i++) {
-        const uint32_t *face = mesh->faces[i / 3], a = face[i % 3], b = face[(i + 1) % 3];
-        edges[i] = (half_edge){a < b ? a : b, a < b ? b : a, (uint32_t)(i / 3), a < b};
+    for (size_t i = 0; i < count; i++)
         links[i] = (link){UINT32_MAX, false};
-    }
-    qsort(edges, count, sizeof *edges, by_edge);
     for (size_t i = 0, next; i < count; i = next) {
-        for (next = i + 1; next < count && edges[next].low == edges[i].low && edges[next].high == edges[i].high;)
-            next++;
-        if (next - i != 2 || edges[i].face == edges[i + 1].face)
+        next = alb_half_edges_end(edges, count, i);
+        const uint32_t a = edges[i].place / 3, b = edges[next - 1].place / 3;
+        if (next - i != 2 || a == b)
             continue;
-        const bool against = edges[i].forward == edges[i + 1].forward;
-        put_link(links, edges[i].face, edges[i + 1].face, against);
-        put_link(links, edges[i + 1].face, edges[i].face, against);
+        const bool against = edges[i].up == edges[i + 1].up;
+        put_link(links, a, b, against);
+        put_link(links, b, a, against);
     }
 }
 
@@ -87,7 +69,7 @@ static size_t colour(uint32_t *queue, unsigned char *colours, bool *sided, const
 bool alb_mesh_orient(alb_mesh *mesh, alb_error *error)
 {
     const size_t n = mesh->face_count;
-    half_edge *edges = alb_allocate(3 * n, sizeof *edges, error);
+    alb_half_edge *edges = alb_half_edges_sorted((const uint32_t(*)[3])mesh->faces, NULL, n, error);
     link *links = alb_allocate(3 * n, sizeof *links, error);
     uint32_t *queue = alb_allocate(n, sizeof *queue, error);
     unsigned char *colours = alb_allocate(n, sizeof *colours, error);

@@ -1,38 +1,19 @@
 // The triangles of one body, side by side, and what lies across their edges.
 #include "base/memory.h"
+#include "render/mesh_edges.h"
 #include "render/optical_solid.h"
 #include <stdlib.h>
-
-typedef struct half_edge {
-    uint32_t low, high, place; // place: 3 * triangle + edge
-    bool up;                   // from low to high
-} half_edge;
-
-static int by_ends(const void *a, const void *b)
-{
-    const half_edge *p = a, *q = b;
-    if (p->low != q->low)
-        return p->low < q->low ? -1 : 1;
-    if (p->high != q->high)
-        return p->high < q->high ? -1 : 1;
-    return p->place < q->place ? -1 : p->place > q->place;
-}
 
 static bool join(alb_surface_net *net, const alb_body *body, const alb_mesh *mesh, alb_error *error)
 {
     const size_t count = 3 * net->count;
-    half_edge *edges = alb_allocate(count, sizeof *edges, error);
+    alb_half_edge *edges = alb_half_edges_sorted((const uint32_t(*)[3])mesh->faces, body->patches, net->count, error);
     if (!edges)
         return false;
-    for (size_t i = 0; i < count; i++) {
-        const uint32_t *face = mesh->faces[body->patches[i / 3]], a = face[i % 3], b = face[(i + 1) % 3];
-        edges[i] = (half_edge){a < b ? a : b, a < b ? b : a, (uint32_t)i, a < b};
+    for (size_t i = 0; i < count; i++)
         net->neighbours[i / 3][i % 3] = UINT32_MAX;
-    }
-    qsort(edges, count, sizeof *edges, by_ends);
     for (size_t i = 0, next; i < count; i = next) {
-        for (next = i + 1; next < count && edges[next].low == edges[i].low && edges[next].high == edges[i].high; next++)
-            ;
+        next = alb_half_edges_end(edges, count, i);
         if (next - i != 2 || edges[i].up == edges[i + 1].up)
             continue;
         const uint32_t a = edges[i].place, b = edges[i + 1].place;
