@@ -1,7 +1,7 @@
 // Irradiance of a patch, by kind of light (Phi flux, n normal, A area, N rays):
 //     point        mean over the patch of  Phi cos / (4 pi d^2), where it sees the light
-//     spot         Phi / N for each of N rays, even in solid angle inside the cone, that meets the patch's front, over
-//     A projector    the same with parallel rays, even over the disc or its pixels, displaced by the Gaussian blur
+//     spot         Phi / (N A) for each of N rays, even in solid angle inside the cone, that meets the patch's front
+//     projector    the same with parallel rays, even over the disc or its pixels, displaced by the Gaussian blur
 //     environment  (pi / R) sum of L(d_q) over the sky rays q of the patch's form factors
 // Stops being true: a shadow that touches none of a patch's outermost points is not there; a point light nearer to a
 // patch than a tenth of its size is held at that distance; a map with a small sun is seen by few of the R rays. A ray

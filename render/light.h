@@ -23,7 +23,7 @@ typedef struct alb_light {
     double pixel_mm;    // the square pixels whose centre lies within diameter_px/2 of the beam's middle, which is the
     double diameter_px; // corner of four pixels where the diameter is even and the centre of one where it is odd
     double blur_sd_mm;  // projector: Gaussian, each axis
-    double radiance[3]; // environment: even, or where map.pixels is there
+    double radiance[3]; // environment: even; of no account where map.pixels is there
     alb_image map;      // environment: latitude-longitude, +y up, the middle of the picture is the direction -z
     double radius_mm;   // environment: of the sphere about position_mm on which it lies; 0: infinitely far away
 } alb_light;
