@@ -110,9 +110,12 @@ void alb_relight_apply(alb_rgb *radiosity, alb_relight *r, const alb_rgb *irradi
 #pragma omp parallel for schedule(static)
     for (size_t k = 0; k < receivers->count; k++)
         for (uint32_t i = receivers->first[k]; i < receivers->first[k + 1]; i++)
-            for (int c = 0; c < 3; c++)
+            for (int c = 0; c < 3; c++) {
+                const double bounced =
+                    receivers->gathered[k][c]; // off by more than itself beside a sharp edge in the dark
                 r->irradiance[receivers->members[i]][c] =
-                    irradiance[receivers->members[i]][c] + receivers->gathered[k][c];
+                    irradiance[receivers->members[i]][c] + (bounced < 0 ? 0 : bounced);
+            }
     alb_scatter_apply(radiosity, r->equations->scatter, (const alb_rgb *)r->irradiance);
 }
 

@@ -38,6 +38,6 @@ bool alb_relight_create(alb_relight *relight, alb_radiosity *equations, const al
                         uint64_t seed, alb_error *error);
 void alb_relight_free(alb_relight *relight);
 size_t alb_relight_bytes(const alb_relight *relight);
-// radiosity: all bounces of the irradiance E, RGB per area, a row for each patch both. One at a time: it uses the
-// scratch.
+// radiosity: all bounces of the irradiance E, RGB per area, a row for each patch both. E is nowhere negative; nor is
+// the radiosity. One at a time: it uses the scratch.
 void alb_relight_apply(alb_rgb *radiosity, alb_relight *relight, const alb_rgb *irradiance);

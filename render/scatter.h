@@ -64,11 +64,11 @@ bool alb_scatter_sum_columns(alb_scatter *scatter, alb_error *error);
 // out = S' irradiance, RGB, per area as the irradiance is; both have patch_count rows and are not the same. Where row
 // sums are estimated they are found beside it.
 void alb_scatter_apply(double (*out)[3], const alb_scatter *scatter, const double (*irradiance)[3]);
-// For materials that stay: products as stored weights, two to three times as fast, up to the next rewrite, beside the
-// links and about as large. error_wanted, relative: what they may miss of light that ends at a sharp edge, as a rule;
-// of smooth light a third of it. 0.005, or 0.01 for less memory. The row sums stay. error_percent (NULL: not asked
-// for): the largest found, |B - B'| / |B'| in the 2-norm weighted by area, over lights with sharp edges at random
-// places. ALB_NO_MEMORY; weights that were kept stay.
+// For materials that stay: products as stored weights of five bits a channel, some six times as fast, up to the next
+// rewrite, beside the links. error_wanted, relative: what they may miss of light that ends at a sharp edge, as a rule;
+// of smooth light a third of it; of light on a single patch tens of times as much. 0.005, or 0.01 for less memory. The
+// row sums stay. error_percent (NULL: not asked for): the largest found, |B - B'| / |B'| in the 2-norm weighted by
+// area, over lights with sharp edges at random places. ALB_NO_MEMORY; weights that were kept stay.
 bool alb_scatter_keep_weights(alb_scatter *scatter, double error_wanted, double *error_percent, alb_error *error);
 // Products by links although weights are kept, up to use_links(..., false): for what asks how much weights miss.
 void alb_scatter_use_links(const alb_scatter *scatter, bool links);

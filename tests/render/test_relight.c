@@ -107,6 +107,14 @@ static void relighting_states_its_error(void **state)
     alb_relight_apply(light, &narrow[2], (const alb_rgb *)s.irradiance);
     omp_set_num_threads(threads);
     assert_memory_equal(light, found, s.patches.count * sizeof *found);
+    // of light on a single patch nothing comes to less than none anywhere
+    for (size_t lit = 0; lit < s.patches.count; lit += 97) {
+        memset(light, 0, s.patches.count * sizeof *light);
+        light[lit][1] = 1;
+        alb_relight_apply(both, &narrow[1], (const alb_rgb *)light);
+        for (size_t p = 0; p < s.patches.count; p++)
+            assert_true(both[p][1] >= 0);
+    }
     check_fails(alb_relight_create(&none, &s.equations, &s.patches, -1, 7, &error), &error, ALB_BAD_DATA, "-1 columns");
     check_fails(alb_relight_create(&none, &s.equations, &s.patches, 513, 7, &error), &error, ALB_BAD_DATA, "at most");
     for (int k = 0; k < 3; k++)
