@@ -189,6 +189,17 @@ static bool lay_blocks(alb_links *links, uint32_t **trees, const alb_forest *for
     return true;
 }
 
+static void free_workspace(alb_link_workspace *work)
+{
+    free(work->wishes);
+    free(work->detours);
+    free(work->targets);
+    free(work->distances);
+    free(work->opposite);
+    alb_optical_workspace_free(&work->paths);
+    alb_found_links_free(&work->found);
+}
+
 bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patches *patches,
                       const alb_body_kernels *of_bodies, const alb_scatter_kernel *kernels,
                       const alb_scatter_kernel_needs *needs, const alb_optical_paths *paths, double error_wanted,
@@ -229,13 +240,7 @@ bool alb_links_create(alb_links *links, const alb_forest *forest, const alb_patc
                 alb_progress_at(&progress, so_far);
         }
         failed = failed || work.found.failed;
-        free(work.wishes);
-        free(work.detours);
-        free(work.targets);
-        free(work.distances);
-        free(work.opposite);
-        alb_optical_workspace_free(&work.paths);
-        alb_found_links_free(&work.found);
+        free_workspace(&work);
     }
     alb_progress_end(&progress);
     free(trees);

@@ -1,4 +1,5 @@
 // Scattering in bodies: energy, density form on unequal patches, both faces of a slab, around a hollow.
+#include "base/random.h"
 #include "prisms.h"
 #include "scatter_world.h"
 
@@ -30,7 +31,8 @@ static void row_sum_of_s_above_one(void **state)
     }
 }
 
-// The columns of S' are its rows weighted by area: sum_j A_j S'_ji over all i and j is one number.
+// The columns of S' are its rows weighted by area: sum_j A_j S'_ji E_i over all i and j is one number, for light of one
+// and for light at random, which tells where in a cluster it falls.
 static void columns_balance_rows(void **state)
 {
     (void)state;
@@ -38,17 +40,28 @@ static void columns_balance_rows(void **state)
     const alb_surface stone = {.name = "marble", .scatters = true, .profiles = {{marble, one, two}}};
     world w;
     world_of_box(&w, &box, &stone);
-    for (int c = 0; c < 3; c++) {
-        double by_rows = 0, by_columns = 0;
-        for (size_t p = 0; p < w.patches.count; p++) {
-            by_rows += w.patches.areas_mm2[p] * w.sums[p][c];
-            by_columns += w.patches.areas_mm2[p] * w.scatter.column_sums[p][c];
+    const size_t n = w.patches.count;
+    double(*light)[3] = calloc(n, sizeof *light), (*out)[3] = calloc(n, sizeof *out);
+    for (int random = 0; random < 2; random++) {
+        for (size_t k = 0; k < 3 * n; k++) {
+            alb_random numbers = alb_random_at(5, 0, k);
+            light[k / 3][k % 3] = random ? pow(alb_random_uniform(&numbers), 4) : 1;
         }
-        check_relative(by_columns, by_rows, 1e-6); // sums of floats
-        for (size_t p = 0; p < w.patches.count; p++)
-            check_relative(w.scatter.row_sums[p][c], w.sums[p][c], 1e-12); // the product with ones
+        alb_scatter_apply(out, &w.scatter, (const double(*)[3])light);
+        for (int c = 0; c < 3; c++) {
+            double by_rows = 0, by_columns = 0;
+            for (size_t p = 0; p < n; p++) {
+                by_rows += w.patches.areas_mm2[p] * out[p][c];
+                by_columns += w.patches.areas_mm2[p] * w.scatter.column_sums[p][c] * light[p][c];
+            }
+            check_relative(by_columns, by_rows, 1e-6); // sums of floats
+        }
     }
+    for (size_t k = 0; k < 3 * n; k++)
+        check_relative(w.scatter.row_sums[k / 3][k % 3], w.sums[k / 3][k % 3], 1e-12); // the product with ones
     assert_true(w.scatter.bodies[0].closed && w.scatter.bodies[0].convex);
+    free(light);
+    free(out);
     world_free(&w);
 }
 

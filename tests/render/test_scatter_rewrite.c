@@ -102,6 +102,50 @@ static void rewriting_agrees_with_new_links(void **state)
     alb_scene_free(&rose);
 }
 
+// Row sums are estimated until a product has found them: of profiles that change by a factor the estimate is exact.
+// What sent out nothing before tells nothing, and is found at once.
+static void estimated_row_sums_are_those_of_scaled_profiles(void **state)
+{
+    (void)state;
+    alb_error error = {0};
+    const double factors[2][3] = {{0.5, 1.25, 0.01}, {1.5, 0.2, 1}};
+    const alb_profile profiles[3] = {one, two, one};
+    const alb_box box = {.size_mm = {20, 20, 5}, .cells = {6, 6, 2}, .grading = 2};
+    alb_surface glass = {.name = "glass", .scatters = true, .slab = true};
+    world w;
+    for (int c = 0; c < 3; c++)
+        glass.profiles[0][c] = profiles[c], glass.profiles[1][c] = profiles[(c + 1) % 3];
+    world_of_box(&w, &box, &glass);
+    const size_t n = w.patches.count;
+    double(*estimates)[3] = calloc(n, sizeof *estimates), (*light)[3] = calloc(n, sizeof *light),
+    (*out)[3] = calloc(n, sizeof *out);
+    for (int step = 0; step < 2; step++) {
+        for (int k = 0; k < 3 * ALB_SIDES; k++)
+            for (int term = 0; term < 4; term += 2)
+                glass.profiles[k / 3][k % 3].parameters[term] *= factors[step][k % 3];
+        check_ok(alb_scatter_rewrite_tables(&w.scatter, &glass, &error), &error);
+        assert_false(alb_scatter_rows_known(&w.scatter));
+        memcpy(estimates, w.scatter.row_sums, n * sizeof *estimates);
+        alb_scatter_apply(out, &w.scatter, (const double(*)[3])light);
+        assert_true(alb_scatter_rows_known(&w.scatter));
+        for (size_t k = 0; k < 3 * n; k++) // tables are floats
+            check_relative(estimates[k / 3][k % 3], w.scatter.row_sums[k / 3][k % 3], 1e-6);
+    }
+    const alb_profile dark = {ALB_FORM_EXPONENTIAL, {0, 0.3}};
+    for (int lit = 0; lit < 2; lit++) {
+        glass.profiles[0][0] = glass.profiles[1][0] = lit ? one : dark;
+        check_ok(alb_scatter_rewrite_tables(&w.scatter, &glass, &error), &error);
+        assert_true(alb_scatter_rows_known(&w.scatter) == (lit == 1));
+        for (size_t p = 0; p < n; p++)
+            assert_true((w.scatter.row_sums[p][0] > 0) == (lit == 1));
+        alb_scatter_sum_rows(&w.scatter);
+    }
+    free(estimates);
+    free(light);
+    free(out);
+    world_free(&w);
+}
+
 // What was opaque cannot scatter on links that were made without it.
 static void other_kinds_of_surface_need_new_links(void **state)
 {
@@ -123,6 +167,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(wider_than_stored_reach),
         cmocka_unit_test(rewriting_agrees_with_new_links),
+        cmocka_unit_test(estimated_row_sums_are_those_of_scaled_profiles),
         cmocka_unit_test(other_kinds_of_surface_need_new_links),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
