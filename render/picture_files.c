@@ -4,6 +4,7 @@
 #include "render/scene.h"
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 static bool name_one(char out[ALB_PATH_SIZE], const char *name, int frame, int frames, alb_error *error)
 {
@@ -16,10 +17,15 @@ static bool name_one(char out[ALB_PATH_SIZE], const char *name, int frame, int f
            alb_fail(error, ALB_USAGE, "%.80s: the path is too long", name);
 }
 
+static bool ends_in(const char *name, const char *ending)
+{
+    const size_t length = strlen(name), tail = strlen(ending);
+    return length > tail && !strcasecmp(name + length - tail, ending);
+}
+
 static bool name_png(char out[ALB_PATH_SIZE], const char *picture, alb_error *error)
 {
-    const size_t length = strlen(picture),
-                 stem = length >= 4 && !strcmp(picture + length - 4, ".exr") ? length - 4 : length;
+    const size_t stem = strlen(picture) - (ends_in(picture, ".exr") ? 4 : 0);
     return snprintf(out, ALB_PATH_SIZE, "%.*s.png", (int)stem, picture) < ALB_PATH_SIZE ||
            alb_fail(error, ALB_USAGE, "%.80s: the path is too long", picture);
 }
@@ -33,12 +39,16 @@ bool alb_frame_files_name(alb_frame_files *out, const alb_picture_files *files, 
         (files->mesh && !name_one(out->mesh, files->mesh, frame, frames, error)))
         return false;
     const char *const paths[] = {files->scene, out->picture, out->png, out->mesh};
+    static const char *const endings[] = {".json", ".exr", ".png", ".ply"};
     for (int i = 1; i < (files->mesh ? 4 : 3); i++) {
         for (int k = 0; k < i; k++)
             if (alb_file_same(paths[i], paths[k]))
                 return alb_fail(error, ALB_USAGE, "%s is given for two files; give each its own", paths[i]);
         if (!alb_file_check_target(paths[i], error))
             return false;
+        if (!ends_in(paths[i], endings[i]))
+            return alb_fail(error, ALB_USAGE, "%s: what is written there is a %s file; give it that ending", paths[i],
+                            endings[i]);
     }
     return true;
 }

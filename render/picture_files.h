@@ -16,7 +16,8 @@ typedef struct alb_frame_files {
 } alb_frame_files;
 
 // The names of one of so many frames. Fails where several frames would share a file, two outputs would be one file or
-// one the scene's, a path is too long, or a file could not be written there: before the work that makes it.
+// one the scene's, a path is too long or does not end in .exr, .png and .ply, or a file could not be written there:
+// before the work that makes it.
 bool alb_frame_files_name(alb_frame_files *out, const alb_picture_files *files, int frame, int frames,
                           alb_error *error);
 // The picture with where it comes from, and its PNG at the exposure.

@@ -173,6 +173,43 @@ static void neighbours_differ_in_phase(void **state)
     world_free(&w);
 }
 
+// One list for a group: of one patch, as long as its row, it is that row; of many and very long, what it gathers is the
+// mean over the group's area of what their rows do. Each of GROUP * RAYS hits is then there once more or less than its
+// share of LENGTH says, at most.
+static void a_group_gathers_the_mean_over_its_area(void **state)
+{
+    (void)state;
+    enum { RAYS = 64, GROUP = 6, LENGTH = 200000 };
+    world w;
+    alb_form_factors f;
+    room_with_ball_create(&w, 6);
+    cast(&f, &w, RAYS, 1);
+    const size_t n = w.patches.count;
+    uint32_t *list = calloc(LENGTH, sizeof *list), row[RAYS], scratch[RAYS];
+    for (uint64_t trial = 0; trial < 40; trial++) {
+        uint32_t group[GROUP];
+        const size_t count = 1 + trial % GROUP;
+        double area = 0, wanted = 0, found = 0;
+        for (size_t i = 0; i < count; i++) {
+            group[i] = (uint32_t)(uniform(3 + trial, i) * (double)n);
+            alb_form_factors_row(row, &f, group[i]);
+            for (int q = 0; q < RAYS; q++)
+                wanted += w.patches.areas_mm2[group[i]] * uniform(2, row[q]) / RAYS;
+            area += w.patches.areas_mm2[group[i]];
+        }
+        alb_form_factors_group_row(list, LENGTH, &f, group, count, scratch);
+        for (size_t q = 0; q < LENGTH; q++)
+            found += uniform(2, list[q]) / LENGTH;
+        check_near(found, wanted / area, (double)(count * RAYS) / LENGTH);
+        alb_form_factors_row(row, &f, group[0]);
+        alb_form_factors_group_row(list, RAYS, &f, group, 1, scratch);
+        assert_memory_equal(list, row, sizeof row);
+    }
+    free(list);
+    alb_form_factors_free(&f);
+    world_free(&w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -181,6 +218,7 @@ int main(void)
         cmocka_unit_test(shared_rows_err_less),
         cmocka_unit_test(phases_together_are_one_finer_lattice),
         cmocka_unit_test(neighbours_differ_in_phase),
+        cmocka_unit_test(a_group_gathers_the_mean_over_its_area),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -209,6 +209,9 @@ static void refuses_what_is_wrong(void **state)
     refuses("lit.json -o lit.exr", "put ####", ALB_USAGE);
     refuses("lit.json -o lit_#.exr --mesh lit.ply", "put ####", ALB_USAGE);
     refuses("lit.json -o lit_#.exr --mesh lit_#.exr", "two files", ALB_USAGE);
+    refuses("lit.json -o lit_#.txt", ".exr", ALB_USAGE);
+    refuses("lit.json -o lit_#.exr --mesh lit_#.obj", ".ply", ALB_USAGE);
+    refuses("lit.json -o lit_#.exr --png lit_#.jpg", ".png", ALB_USAGE);
     static const struct {
         const char *lights, *part;
         alb_status status;

@@ -345,6 +345,43 @@ static void starts_cost_one_product_and_never_harm(void **state)
     }
 }
 
+// Vectors, more than are taken at once, become orthonormal in the mean over area, and images under a map, here half the
+// vector from back to front, stay that; one that lies in the span of those before becomes zero.
+static void vectors_become_orthonormal(void **state)
+{
+    (void)state;
+    enum { COUNT = ALB_SPACE_VECTORS + 5, ROWS = 80, TWICE = 9 };
+    static alb_rgb vectors[COUNT][ROWS], images[COUNT][ROWS];
+    alb_rgb *v[COUNT], *image[COUNT];
+    double areas[ROWS], all = 0;
+    alb_error error = {0};
+    alb_space space;
+    for (size_t i = 0; i < ROWS; i++) {
+        alb_random random = alb_random_at(31, 0, i);
+        all += areas[i] = 0.01 + alb_random_uniform(&random);
+    }
+    check_ok(alb_space_create(&space, areas, ROWS, &error), &error);
+    for (int k = 0; k < COUNT; k++) {
+        v[k] = vectors[k], image[k] = images[k];
+        fill_light(vectors[k], ROWS, (uint64_t)(k == TWICE ? TWICE - 1 : k));
+        for (size_t i = 0; i < ROWS; i++)
+            for (int c = 0; c < 3; c++)
+                images[k][i][c] = 0.5 * vectors[k][ROWS - 1 - i][c];
+        alb_space_orthonormalise(&space, v, image, k, 1e-8);
+        for (int j = 0; j <= k; j++)
+            for (int c = 0; c < 3; c++) {
+                double dot = 0;
+                for (size_t i = 0; i < ROWS; i++)
+                    dot += areas[i] / all * vectors[j][i][c] * vectors[k][i][c];
+                check_near(dot, j == k && k != TWICE, 1e-13);
+            }
+        for (size_t i = 0; i < ROWS; i++)
+            for (int c = 0; c < 3; c++)
+                check_near(images[k][i][c], 0.5 * vectors[k][ROWS - 1 - i][c], 1e-11);
+    }
+    alb_space_free(&space);
+}
+
 static void empty(void **state)
 {
     (void)state;
@@ -428,6 +465,7 @@ int main(void)
         cmocka_unit_test(chebyshev_interval),
         cmocka_unit_test(albedo_to_one_closed),
         cmocka_unit_test(starts_cost_one_product_and_never_harm),
+        cmocka_unit_test(vectors_become_orthonormal),
         cmocka_unit_test(empty),
         cmocka_unit_test(a_number_that_is_none_never_converges),
         cmocka_unit_test(says_what_a_solver_lacks),
