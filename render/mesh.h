@@ -45,6 +45,7 @@ bool alb_mesh_read(alb_mesh *mesh, const char *path, alb_error *error);
 // The two formats from memory; `name` is for messages. `bytes` must be followed by a NUL.
 bool alb_mesh_parse_obj(alb_mesh *mesh, const char *name, const char *bytes, size_t size, alb_error *error);
 bool alb_mesh_parse_ply(alb_mesh *mesh, const char *name, const char *bytes, size_t size, alb_error *error);
-// Binary little-endian PLY with float red, green, blue on each face (radiosity); `comment` has no line break.
+// Binary little-endian PLY with double x, y, z and float red, green, blue on each face (radiosity); `comment` has no
+// line break.
 bool alb_mesh_write_ply(const alb_mesh *mesh, const float (*face_rgb)[3], const char *comment, const char *path,
                         alb_error *error);
