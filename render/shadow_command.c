@@ -7,6 +7,7 @@
 #include "render/shadow_advisor.h"
 #include "render/shadow_picture.h"
 #include "render/view.h"
+#include <math.h>
 #include <stdio.h>
 
 typedef struct sequence {
@@ -78,7 +79,7 @@ static bool render_frame(sequence *s, int frame, alb_error *error)
 static void print_choice(const sequence *s)
 {
     const double frame_s = (s->sampling_s + s->light_s) / s->frames, times = s->verdict.rays_s / frame_s;
-    if (!(times > 0))
+    if (!(times > 0) || s->verdict.percent == 0)
         return;
     printf("rays of that error, %.0f a vertex, would take %.0f ms a frame: ", s->verdict.rays, 1e3 * s->verdict.rays_s);
     if (times > 1)
@@ -87,19 +88,28 @@ static void print_choice(const sequence *s)
         printf("cast rays here, or render by radiosity\n");
 }
 
-static bool report(const sequence *s, bool as_json, alb_error *error)
+static void print_report(const sequence *s)
+{
+    printf("%s: %d frames, %zu vertices, %zu occluders, ", s->to.picture, s->frames, s->stage.vertex_count,
+           s->stage.occluder_count);
+    if (isnan(s->verdict.percent))
+        printf("nothing is lit where an error could be found");
+    else if (s->verdict.percent == 0) // less than the random error of the rays that it is found by
+        printf("stated error below %.2g %%", s->verdict.upper_percent);
+    else
+        printf("stated error %.2g %% (within %.2g %%)", s->verdict.percent, s->verdict.upper_percent);
+    printf(", %.1f ms sampling and %.1f ms lighting a frame\n", 1e3 * s->sampling_s / s->frames,
+           1e3 * s->light_s / s->frames);
+    print_choice(s);
+}
+
+static bool print_json(const sequence *s, alb_error *error)
 {
     const alb_shadow_stage *stage = &s->stage;
     const alb_shadow_settings *settings = stage->occluder_count ? &stage->fields[0].settings : &stage->settings;
-    if (!as_json) {
-        printf(
-            "%s: %d frames, %zu vertices, %zu occluders, stated error %.2g %% (within %.2g %%), %.1f ms sampling and "
-            "%.1f ms lighting a frame\n",
-            s->to.picture, s->frames, s->stage.vertex_count, s->stage.occluder_count, s->verdict.percent,
-            s->verdict.upper_percent, 1e3 * s->sampling_s / s->frames, 1e3 * s->light_s / s->frames);
-        print_choice(s);
-        return true;
-    }
+    size_t bytes = 0;
+    for (size_t k = 0; k < stage->occluder_count; k++)
+        bytes += alb_shadow_field_bytes(&stage->fields[k]);
     alb_json json;
     alb_json_begin(&json, NULL);
     alb_json_integer(&json, "frames", s->frames);
@@ -112,6 +122,8 @@ static bool report(const sequence *s, bool as_json, alb_error *error)
     alb_json_integer(&json, "cells", settings->cells);
     alb_json_integer(&json, "shells_outside", settings->outer);
     alb_json_integer(&json, "shells_inside", settings->inner);
+    alb_json_boolean(&json, "samples_as_bytes", settings->packed);
+    alb_json_integer(&json, "field_bytes", (long)bytes);
     alb_json_number(&json, "stated_error_percent", s->verdict.percent);
     alb_json_number(&json, "upper_error_percent", s->verdict.upper_percent);
     alb_json_number(&json, "rays_of_that_error", s->verdict.rays);
@@ -146,7 +158,9 @@ bool alb_shadow_render(const char *scene_path, const char *picture, const char *
         alb_progress_at(&progress, frame + 1);
     }
     alb_progress_end(&progress);
-    ok = ok && report(&s, json, error);
+    if (ok && !json)
+        print_report(&s);
+    ok = ok && (!json || print_json(&s, error));
     alb_shadow_stage_free(&s.stage);
     return ok;
 }

@@ -1,8 +1,7 @@
 // Scenes for --method shadow: what their keys mean, frames and their names, what is refused; the command from end to
 // end; the error that is stated.
 #include "base/exr.h"
-#include "base/file.h"
-#include "check.h"
+#include "program.h"
 #include "render/shadow_advisor.h"
 #include "render/shadow_command.h"
 #include "scenes/shadow_scenes.h"
@@ -192,6 +191,18 @@ static void renders_a_sequence(void **state)
     check_below(dark[2], 0.5); // albedo 0.5 under an even sky of 1
 }
 
+// No number where there is none.
+static void says_in_words_that_nothing_is_lit(void **state)
+{
+    (void)state;
+    write_frames();
+    write_scene(GROUND "," BALL, "\"lights\":[{\"kind\":\"environment\",\"radiance\":[0,0,0]}],", 3);
+    assert_int_equal(run("render test_shadow.json --method shadow -o dark_#.exr"), 0);
+    assert_non_null(strstr(output, "nothing is lit"));
+    assert_null(strstr(output, "nan"));
+    forget_runs();
+}
+
 static void says_what_error_it_makes(void **state)
 {
     (void)state;
@@ -272,6 +283,7 @@ int main(void)
         cmocka_unit_test(frames_are_numbered),
         cmocka_unit_test(refuses_what_is_wrong),
         cmocka_unit_test(renders_a_sequence),
+        cmocka_unit_test(says_in_words_that_nothing_is_lit),
         cmocka_unit_test(says_what_error_it_makes),
         cmocka_unit_test(four_scenes_have_their_counts),
         cmocka_unit_test(lights_alone_need_fewer_shells),
