@@ -34,6 +34,9 @@ typedef struct alb_scatter {
     // share of the flux into patch i that leaves again anywhere, by which the energy balances.
     double (*row_sums)[3], (*column_sums)[3];
     bool columns_known; // the column sums are those of the profiles as they are
+    // By how much what a body or an opaque patch sends out of even light changed at the latest rewrite, over what it
+    // was: the most by the totals of the profiles. INFINITY before, and where that cannot be told.
+    double change;
     alb_scatter_body *bodies;
     size_t body_count;
     size_t link_count;        // an exit patch and a cluster, a patch or a part of a patch that lights it

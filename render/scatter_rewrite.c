@@ -62,22 +62,31 @@ static double ratio_of(const alb_scatter_parts *p, const alb_tree *tree, const a
     return before > 0 ? now / before : now > 0 ? HUGE_VAL : 1;
 }
 
-// Row sums as the totals of the profiles let expect. False where they do not.
+// Row sums as the totals of the profiles let expect, and by how much they change. False where they do not.
 static bool estimate_rows(alb_scatter *scatter, const alb_surface *surfaces)
 {
     const alb_scatter_parts *p = scatter->parts;
-    for (size_t k = 0; k < p->opaque_count; k++)
-        memcpy(scatter->row_sums[p->opaque[k]], scatter->local[p->opaque[k]], sizeof *scatter->local);
+    double change = 0;
+    for (size_t k = 0; k < p->opaque_count; k++) {
+        double *sums = scatter->row_sums[p->opaque[k]];
+        const double *now = scatter->local[p->opaque[k]];
+        for (int c = 0; c < 3; c++)
+            change = now[c] == sums[c] ? change : fmax(change, fabs(now[c] / sums[c] - 1)); // infinite from zero
+        memcpy(sums, now, sizeof *scatter->local);
+    }
     for (const alb_tree *tree = p->forest.trees; tree < p->forest.trees + p->forest.tree_count; tree++) {
         double ratios[3];
         for (int c = 0; c < 3; c++)
             if (!isfinite(ratios[c] = ratio_of(p, tree, surfaces, c)))
                 return false;
+            else
+                change = fmax(change, fabs(ratios[c] - 1));
 #pragma omp parallel for schedule(static) if (tree->leaf_count > 4096)
         for (uint32_t leaf = tree->first_leaf; leaf < tree->first_leaf + tree->leaf_count; leaf++)
             for (int c = 0; c < 3; c++)
                 scatter->row_sums[p->forest.patches[leaf]][c] *= ratios[c];
     }
+    scatter->change = change;
     return true;
 }
 
@@ -91,6 +100,7 @@ bool alb_scatter_rewrite_tables(alb_scatter *scatter, const alb_surface *surface
         alb_scatter_kernel_write(&p->kernels[k], surfaces[p->kernels[k].surface].profiles[p->kernels[k].side]);
     alb_product_write_pairs(&p->links, p->kernels);
     write_local(scatter, surfaces);
+    scatter->change = INFINITY;
     const bool estimated = p->rows_known && estimate_rows(scatter, surfaces);
     for (size_t k = 0; k < p->kernel_count; k++)
         for (int c = 0; c < 3; c++)

@@ -142,10 +142,10 @@ static void make_steps(steps *s, int order)
 {
     pthread_once(&once, make_kept);
     column c;
-    for (int m = 0; m < order; m++) {
+    for (int m = 0; m < order && m < ALB_SH_ORDER_MAX; m++) {
         begin_column(&c, m, (alb_vector){0});
         s->first[m] = (float)c.first;
-        for (int l = m + 1; l < order; l++) {
+        for (int l = m + 1; l < order && l < ALB_SH_ORDER_MAX; l++) {
             s->a[l * (l + 1) / 2 + m] = (float)step_to(l, m).a;
             s->b[l * (l + 1) / 2 + m] = (float)step_to(l, m).b;
         }

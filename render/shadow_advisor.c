@@ -88,7 +88,7 @@ static void compare(alb_shadow_verdict *verdict, const samples *s)
             continue;
         if (!(percent <= worst)) {
             worst = percent;
-            verdict->rays = pow(random / fmax(square, 1e-6 * mean * mean), 0.75);
+            verdict->rays = square > 0 ? pow(random / fmax(square, 1e-6 * mean * mean), 0.75) : (double)NAN;
         }
         upper = fmax(100 * sqrt(fmax(square + 3 * spread, 0)) / mean, isnan(upper) ? 0 : upper);
     }
@@ -145,6 +145,9 @@ bool alb_shadow_advise(alb_shadow_stage *stage, alb_shadow_verdict *verdict, con
         alb_shadow_stage_set(stage, &settings);
         if (!alb_shadow_stage_light(stage, scene, error) || !alb_shadow_error(verdict, stage, scene, seed, error))
             return false;
+        if (isnan(verdict->upper_percent))
+            return alb_fail(error, ALB_UNDECIDED,
+                            "nothing is lit where an error of shadow fields could be found; leave --error out");
         if (verdict->upper_percent <= wanted_percent)
             return true;
         best = fmin(best, verdict->upper_percent);

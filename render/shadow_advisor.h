@@ -4,7 +4,7 @@
 
 typedef struct alb_shadow_verdict {
     double percent, upper_percent; // rms error of the irradiance over its mean; above it in 5 of 100 scenes at most
-    double rays, rays_s;           // rays a vertex that err as much, and the seconds they take for all vertices
+    double rays, rays_s; // rays a vertex that err as much, and the seconds they take for all vertices; NAN for none
 } alb_shadow_verdict;
 
 // rms error of the lit stage's irradiance over vertices drawn at random, against rays; the rays' own random error is

@@ -79,7 +79,7 @@ static bool render_frame(sequence *s, int frame, alb_error *error)
 static void print_choice(const sequence *s)
 {
     const double frame_s = (s->sampling_s + s->light_s) / s->frames, times = s->verdict.rays_s / frame_s;
-    if (!(times > 0) || s->verdict.percent == 0)
+    if (!(times > 0))
         return;
     printf("rays of that error, %.0f a vertex, would take %.0f ms a frame: ", s->verdict.rays, 1e3 * s->verdict.rays_s);
     if (times > 1)

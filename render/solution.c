@@ -14,8 +14,9 @@
 
 const char *const alb_stage_names[ALB_STAGES] = {"tracer", "form_factors", "lights", "scattering", "solve"};
 
-// A change of the direct light, |E - E'| / |E|, below which the last solution is the better start.
-static const double small_change = 0.005;
+// Changes of the direct light, |E - E'| / |E|, and of what materials send of even light in all, below which the last
+// solution is the better start. How wide materials scatter matters little: what patches send each other knows it less.
+static const double small_change = 0.005, small_change_of_materials = 0.01;
 
 static const alb_solver default_solver = ALB_SOLVER_TWO_LEVEL;
 
@@ -136,7 +137,7 @@ static double change_of(const alb_solution *s, const double (*before)[3])
     return all > 0 ? change / all : 0;
 }
 
-// same: the materials are those of the solution as it stands.
+// same: the materials send as much as those of the solution as it stands.
 static bool relight(alb_solution *s, const alb_scene *scene, bool same, alb_error *error)
 {
     const size_t n = s->patches.count;
@@ -175,7 +176,7 @@ bool alb_solution_rematerial(alb_solution *s, const alb_scene *scene, alb_error 
         alb_error solving = {0};
         memcpy(before, s->radiosity, n * sizeof *before);
         alb_radiosity_refresh(&s->equations);
-        ok = relight(s, scene, false, &solving);
+        ok = relight(s, scene, s->scatter.change < small_change_of_materials, &solving);
         alb_scatter_sum_rows(&s->scatter);
         alb_radiosity_refresh(&s->equations);
         if (!check_scattering(s, scene, error))

@@ -9,7 +9,7 @@ typedef double rgb[3];
 
 typedef struct figures {
     size_t patches;
-    double forms_s, scatter_s, bytes_mb, lights_s, relight_s, change_s;
+    double forms_s, scatter_s, bytes_mb, lights_s, relight_s, change_s, change_times;
     double error_percent, rays_error_percent, stated_percent;
     int products, jacobi_products;
 } figures;

@@ -29,17 +29,17 @@ static void solutions_can_change(void **state)
     alb_solution s, fresh;
     room(&scene);
     check_ok(alb_solution_create(&s, &scene, &error), &error);
-    for (int change = 0; change < 5; change++) {
+    for (int change = 0; change < 6; change++) {
         if (change == 0) // by little: the last solution is a start
             scene.lights[0].flux[0] = 1.001;
         else if (change == 1) // by much
             scene.lights[1].position_mm.x = -20, scene.lights[0].flux[1] = 0;
         else if (change == 2) // a wall that glows
             scene.surfaces[0].exitance[2] = 1e-5;
-        else
+        else // less of it and wider, more of it, as much of it and narrower
             for (int c = 0; c < 3; c++) {
-                scene.surfaces[1].profiles[0][c].parameters[0] *= change == 3 ? 0.5 : 1.2;
-                scene.surfaces[1].profiles[0][c].parameters[1] *= change == 3 ? 0.8 : 1;
+                scene.surfaces[1].profiles[0][c].parameters[0] *= change == 3 ? 0.5 : change == 4 ? 1.2 : 1.25 * 1.25;
+                scene.surfaces[1].profiles[0][c].parameters[1] *= change == 3 ? 0.8 : change == 4 ? 1 : 1.25;
                 scene.surfaces[0].reflectance[c] = 0.3 + 0.1 * c;
             }
         check_ok(change < 3 ? alb_solution_relight(&s, &scene, &error) : alb_solution_rematerial(&s, &scene, &error),
@@ -57,6 +57,8 @@ static void solutions_can_change(void **state)
         }
         if (change == 0)
             assert_true(products < fresh.report.iterations);
+        if (change >= 3)
+            check_near(s.scatter.change, change == 3 ? 3.0 / 7 : change == 4 ? 0.2 : 0, 1e-9);
         alb_solution_free(&fresh);
     }
     // refused, and then taken again

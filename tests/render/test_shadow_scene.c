@@ -200,6 +200,8 @@ static void says_in_words_that_nothing_is_lit(void **state)
     assert_int_equal(run("render test_shadow.json --method shadow -o dark_#.exr"), 0);
     assert_non_null(strstr(output, "nothing is lit"));
     assert_null(strstr(output, "nan"));
+    assert_int_equal(run("render test_shadow.json --method shadow -o dark_#.exr --error 5"), ALB_UNDECIDED);
+    assert_non_null(strstr(complaint, "nothing is lit"));
     forget_runs();
 }
 
